@@ -1,0 +1,1 @@
+"""What crosses rooms: rigid motions, the camera model, messages, clouds, events."""

@@ -1,0 +1,51 @@
+"""A point cloud, and who saw each point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.arrays import read_only
+
+
+class Source(IntEnum):
+    """The robot that saw a point."""
+
+    GROUND = 0
+    MAV = 1
+
+
+@dataclass(frozen=True, eq=False)
+class PointCloud:
+    """Points with colour, and where known with normals.
+
+    Attributes:
+        points: (N, 3) float32 [m], all finite.
+        colours: (N, 3) uint8 RGB; grey points repeat their value.
+        normals: (N, 3) float32 unit vectors, or None where nobody computed them.
+    """
+
+    points: NDArray[np.float32]
+    colours: NDArray[np.uint8]
+    normals: NDArray[np.float32] | None = None
+
+    def __post_init__(self) -> None:
+        points = read_only(self.points, "points", (None, 3), np.float32)
+        if not np.isfinite(points).all():
+            raise ValueError("points: every coordinate must be finite")
+        object.__setattr__(self, "points", points)
+        colours = read_only(self.colours, "colours", (len(points), 3), np.uint8)
+        object.__setattr__(self, "colours", colours)
+        if self.normals is not None:
+            normals = read_only(self.normals, "normals", (len(points), 3), np.float32)
+            object.__setattr__(self, "normals", normals)
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @classmethod
+    def empty(cls) -> PointCloud:
+        return cls(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint8))

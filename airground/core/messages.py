@@ -1,0 +1,119 @@
+"""What the sensors say: one frozen type a message, each stamped in integer nanoseconds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.arrays import read_only
+from airground.core.camera import PinholeCamera
+from airground.core.se3 import SE3
+
+
+@dataclass(frozen=True, eq=False)
+class MavImage:
+    """One image of the MAV's downward camera.
+
+    Attributes:
+        stamp_ns: When the middle of the exposure was, by the camera's clock.
+        image: (height, width) uint8, grey.
+    """
+
+    stamp_ns: int
+    image: NDArray[np.uint8]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "image", read_only(self.image, "image", (None, None), np.uint8))
+
+
+@dataclass(frozen=True, eq=False)
+class GroundImage:
+    """One registered RGB-D frame of the ground robot.
+
+    Attributes:
+        stamp_ns: When the middle of the exposure was, by the camera's clock.
+        colour: (height, width, 3) uint8 RGB.
+        depth: (height, width) float32 [m], z along the optical axis, NaN where missing.
+    """
+
+    stamp_ns: int
+    colour: NDArray[np.uint8]
+    depth: NDArray[np.float32]
+
+    def __post_init__(self) -> None:
+        colour = read_only(self.colour, "colour", (None, None, 3), np.uint8)
+        depth = read_only(self.depth, "depth", colour.shape[:2], np.float32)
+        object.__setattr__(self, "colour", colour)
+        object.__setattr__(self, "depth", depth)
+
+
+@dataclass(frozen=True, eq=False)
+class ImuSamples:
+    """A run of inertial measurements in the `imu` frame.
+
+    Attributes:
+        stamps_ns: (N,) int64, strictly increasing.
+        gyro: (N, 3) float64 [rad/s].
+        accelerometer: (N, 3) float64 [m/s^2]; at rest it reads +9.81 upwards.
+    """
+
+    stamps_ns: NDArray[np.int64]
+    gyro: NDArray[np.float64]
+    accelerometer: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        stamps = read_only(self.stamps_ns, "stamps_ns", (None,), np.int64)
+        n = len(stamps)
+        if (np.diff(stamps) <= 0).any():
+            raise ValueError("stamps_ns must strictly increase")
+        object.__setattr__(self, "stamps_ns", stamps)
+        object.__setattr__(self, "gyro", read_only(self.gyro, "gyro", (n, 3), np.float64))
+        object.__setattr__(
+            self,
+            "accelerometer",
+            read_only(self.accelerometer, "accelerometer", (n, 3), np.float64),
+        )
+
+    def between(self, start_ns: int, end_ns: int) -> ImuSamples:
+        """The samples with start_ns < stamp <= end_ns."""
+        lo, hi = np.searchsorted(self.stamps_ns, [start_ns, end_ns], side="right")
+        return ImuSamples(self.stamps_ns[lo:hi], self.gyro[lo:hi], self.accelerometer[lo:hi])
+
+
+@dataclass(frozen=True, eq=False)
+class MagneticSamples:
+    """A run of magnetometer measurements in the `imu` frame.
+
+    Attributes:
+        stamps_ns: (N,) int64, strictly increasing.
+        field: (N, 3) float64 [T].
+    """
+
+    stamps_ns: NDArray[np.int64]
+    field: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        stamps = read_only(self.stamps_ns, "stamps_ns", (None,), np.int64)
+        if (np.diff(stamps) <= 0).any():
+            raise ValueError("stamps_ns must strictly increase")
+        object.__setattr__(self, "stamps_ns", stamps)
+        object.__setattr__(
+            self, "field", read_only(self.field, "field", (len(stamps), 3), np.float64)
+        )
+
+
+@dataclass(frozen=True)
+class RobotCalibration:
+    """What the pipeline is told about one robot's sensors (slightly wrong, as in life).
+
+    Attributes:
+        camera: Intrinsics of its camera.
+        T_imu_camera: The camera in the IMU's frame.
+        T_body_imu: The IMU in the robot's body (x forward, z up).
+    """
+
+    camera: PinholeCamera
+    T_imu_camera: SE3
+    T_body_imu: SE3

@@ -1,0 +1,21 @@
+"""The one family of errors that a user is meant to read."""
+
+
+class AirgroundError(Exception):
+    """A problem that one line explains: what was wrong, where, and what would be right.
+
+    The command line prints the message without a traceback and exits non-zero. Anything
+    else that escapes is a bug.
+    """
+
+
+class InputError(AirgroundError):
+    """What the user handed over (a file, a key, a number) cannot be used."""
+
+
+class RecordingError(InputError):
+    """A recording on disk is missing something, is damaged, or contradicts itself."""
+
+
+class ConfigError(InputError):
+    """A parameter is unknown or out of its range."""
