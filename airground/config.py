@@ -1,0 +1,184 @@
+"""Every parameter of the pipeline: its unit, its default and the section it comes from.
+
+The defaults are the preset `best`; `paper()` returns the constants as published.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Positive = Annotated[float, Field(gt=0)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+Count = Annotated[int, Field(ge=1)]
+
+
+class Section(BaseModel):
+    """A frozen group of parameters that refuses keys it does not know."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class ViewSelection(Section):
+    """Which frames make a depth map, and which depth maps a surface (Sec. VIII-B)."""
+
+    depth_map_radius_m: Positive = 0.12
+    """Views within this distance of the reference view join its depth map [m]."""
+    fusion_radius_m: Positive = 0.70
+    """Depth maps within this distance of the first are fused [m]."""
+    both_sides: bool = True
+    """Also use the views before the reference, so that what one side hides the other sees."""
+    max_views: Count = 16
+    """At most this many views a depth map; more are thinned evenly."""
+    min_views: Count = 5
+    """Fewer views than this make no depth map."""
+
+
+class PlaneSweep(Section):
+    """Depth maps from many close views (Sec. V)."""
+
+    hypotheses: Count = 200
+    """Depth planes, evenly spaced in inverse depth."""
+    window_px: Count = 5
+    """Side of the window over which the photometric error is averaged [px, half resolution]."""
+    truncation: Positive = 40.0
+    """Absolute intensity difference above which a sample counts no more [grey levels]."""
+    min_uniqueness: Fraction = 0.85
+    """Best cost over the best cost elsewhere must be below this; 1 keeps everything."""
+    max_curvature_sigma_m: Positive = 0.03
+    """Depth is dropped where the cost's minimum is so flat that its deviation exceeds this [m]."""
+
+
+class Fusion(Section):
+    """Distance fields in a histogram and their TV-L1 fusion (Sec. V, Eq. 1)."""
+
+    voxels: tuple[Count, Count, Count] = (376, 240, 150)
+    """Size of the volume of interest [voxels]."""
+    truncation_m: Positive = 0.07
+    """Distance at which the field reaches -1 or 1 [m]."""
+    bins: Count = 8
+    """Histogram bins over [-1, 1]."""
+    data_weight: Positive = 0.26
+    """Lambda of Eq. 1."""
+    iterations: Count = 8
+    """Primal-dual steps."""
+    min_observations: Count = 2
+    """A surface point needs at least this many depth maps to count."""
+    min_depth_maps: Count = 3
+    """Fewer depth maps than this are not fused."""
+
+
+class GroundMapping(Section):
+    """The ground robot's map from RGB-D frames and poses (Sec. IV)."""
+
+    keyframe_distance_m: Positive = 0.10
+    """A frame joins the map once the camera moved this far [m] ..."""
+    keyframe_angle_deg: Positive = 5.0
+    """... or turned this far [deg]."""
+    max_depth_m: Positive = 4.0
+    """Depth beyond this is too noisy to keep [m]."""
+    voxel_m: Positive = 0.02
+    """Points of a keyframe, and of the map, are averaged over cubes of this side [m]."""
+
+
+class HeightMaps(Section):
+    """Gravity-aligned height maps (Sec. VI-A)."""
+
+    cells_per_m: Positive = 25.0
+    """Resolution [cells/m]."""
+    dilate_holes: bool = True
+    """Fill holes by the highest of the 3 x 3 neighbours."""
+
+
+class Localization(Section):
+    """Cost map and Monte Carlo localization (Sec. VI)."""
+
+    cost: Literal["zmssd", "ncc"] = "ncc"
+    """Eq. 2, or one minus the normalized correlation of the overlapping heights."""
+    sigma: Positive = 0.05
+    """Eq. 5, in units of the cost (m^2 for zmssd, none for ncc)."""
+    sigma_units: Literal["cost", "minmax"] = "cost"
+    """Whether sigma divides the cost itself or the cost scaled to [0, 1] over the map."""
+    min_overlap: Fraction = 0.3
+    """Smallest overlap, as a fraction of the aerial map's filled cells."""
+    search_radius_m: Positive = 3.0
+    """Half the side of the square searched around the ground robot [m]."""
+    particles: Count = 200
+    """M of Eq. 4."""
+    motion_noise_m: Positive = 0.03
+    """Standard deviation of the motion model per axis [m] (Eq. 6)."""
+    heading: Literal["known", "search"] = "known"
+    """Heading from the magnetometers, or searched as a third dimension of u."""
+    headings: Count = 360
+    """Headings tried over the full circle when searched."""
+    heading_noise_deg: Positive = 1.0
+    """Standard deviation of the heading's motion model when searched [deg]."""
+    redrawn_fraction: Fraction = 0.1
+    """Share of the particles drawn anew from the current cost map at each update."""
+    converged_spread_m: Positive = 0.15
+    """The belief has converged when the particles' standard deviation falls below this [m]."""
+    max_cost: Positive = 0.5
+    """A converged belief is refused when its cost exceeds this (ncc: correlation below 0.5)."""
+    min_relief_m: Positive = 0.03
+    """Heights that deviate less than this over the overlap carry no structure [m]."""
+
+
+class Refinement(Section):
+    """Point-to-plane ICP and what it needs to converge (Sec. VII)."""
+
+    local_search: bool = True
+    """Search the height maps around the start before ICP."""
+    local_search_radius_m: Positive = 0.6
+    """Half the side of that search [m]."""
+    local_search_cells_per_m: Positive = 50.0
+    """Its resolution [cells/m]."""
+    level_prior: bool = True
+    """Both maps are gravity-aligned: keep only the heading of a prior's rotation."""
+    voxel_m: Positive = 0.03
+    """Clouds are averaged over cubes of this side before ICP [m]."""
+    max_distance_m: Positive = 0.3
+    """Correspondences farther apart than this are ignored at first [m] ..."""
+    final_distance_m: Positive = 0.05
+    """... and than this at the end [m]."""
+    trim: Fraction = 0.75
+    """Share of the closest correspondences that is kept."""
+    iterations: Count = 30
+    """Most ICP steps in all."""
+    min_inliers: Fraction = 0.35
+    """An alignment is refused when fewer aerial points than this lie on the ground map."""
+
+
+class Config(Section):
+    """The whole pipeline."""
+
+    preset: Literal["paper", "best"] = "best"
+    view_selection: ViewSelection = ViewSelection()
+    plane_sweep: PlaneSweep = PlaneSweep()
+    fusion: Fusion = Fusion()
+    ground_mapping: GroundMapping = GroundMapping()
+    height_maps: HeightMaps = HeightMaps()
+    localization: Localization = Localization()
+    refinement: Refinement = Refinement()
+
+
+def paper() -> Config:
+    """The constants as published; what the paper leaves open stays at our defaults."""
+    return Config(
+        preset="paper",
+        view_selection=ViewSelection(both_sides=False),
+        plane_sweep=PlaneSweep(min_uniqueness=1.0),
+        fusion=Fusion(min_observations=1),
+        height_maps=HeightMaps(cells_per_m=50.0),
+        localization=Localization(
+            cost="zmssd",
+            sigma=0.08,
+            min_overlap=0.5,
+            redrawn_fraction=0.0,
+            max_cost=1.0,
+        ),
+        refinement=Refinement(local_search=False, level_prior=False),
+    )
+
+
+PRESETS = {"best": Config, "paper": paper}
