@@ -79,7 +79,9 @@ class GroundMapping(Section):
     max_depth_m: Positive = 4.0
     """Depth beyond this is too noisy to keep [m]."""
     voxel_m: Positive = 0.02
-    """Points of a keyframe, and of the map, are averaged over cubes of this side [m]."""
+    """Points of the map are averaged over cubes of this side [m]."""
+    min_points: Count = 4
+    """Cubes that fewer depth pixels than this fell into are noise."""
 
 
 class HeightMaps(Section):

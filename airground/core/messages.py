@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from airground.core.arrays import read_only
 from airground.core.camera import PinholeCamera
+from airground.core.cloud import Source
 from airground.core.se3 import SE3
 
 
@@ -117,3 +118,14 @@ class RobotCalibration:
     camera: PinholeCamera
     T_imu_camera: SE3
     T_body_imu: SE3
+
+
+Message = MavImage | GroundImage | ImuSamples | MagneticSamples
+
+
+@dataclass(frozen=True)
+class Stamped:
+    """A message and the robot that sent it; its time is that of its newest measurement."""
+
+    robot: Source
+    message: Message

@@ -1,0 +1,251 @@
+"""The localization and mapping pipeline, as in the paper's Figure 4.
+
+Sensor messages in, events out. Each robot maps on its own; whenever the MAV has a new
+surface it is located in the ground robot's map, refined, and added to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from airground.augmentation import Augmentation, AugmentedMap
+from airground.config import Config
+from airground.core.cloud import PointCloud, Source
+from airground.core.events import (
+    Aligned,
+    Event,
+    GroundMapExtended,
+    GroundTracked,
+    MapAugmented,
+    MavTracked,
+    SurfaceCast,
+    TrackingLost,
+)
+from airground.core.messages import (
+    GroundImage,
+    ImuSamples,
+    MagneticSamples,
+    MavImage,
+    RobotCalibration,
+    Stamped,
+)
+from airground.core.se3 import SE3
+from airground.core.surface import AerialSurface
+from airground.dense.reconstruction import DenseReconstruction
+from airground.ground_map import GroundMap
+from airground.localization.heading import HeadingEstimator
+from airground.localization.particle_filter import MonteCarloLocalizer
+from airground.refinement import refine
+from airground.slam.front_end import FrontEnd
+
+
+@dataclass(frozen=True)
+class FrontEnds:
+    """Who says where the cameras are (Sec. IV)."""
+
+    mav: FrontEnd[MavImage]
+    ground: FrontEnd[GroundImage]
+
+
+class Mapping:
+    """The upper half of Figure 4: what each robot knows without the other.
+
+    Args:
+        config: The pipeline's parameters.
+        mav, ground: What is known about the robots' sensors.
+        front_ends: Who says where the cameras are.
+    """
+
+    def __init__(
+        self, config: Config, mav: RobotCalibration, ground: RobotCalibration, front_ends: FrontEnds
+    ) -> None:
+        self._calibration = {Source.MAV: mav, Source.GROUND: ground}
+        self._front_ends = front_ends
+        self._dense = DenseReconstruction(mav.camera, config)
+        self._magnetic: dict[Source, list[MagneticSamples]] = {Source.MAV: [], Source.GROUND: []}
+        self._north = {Source.MAV: HeadingEstimator(), Source.GROUND: HeadingEstimator()}
+        self.ground_map = GroundMap(ground.camera, config.ground_mapping)
+        self.T_mav_camera: SE3 | None = None
+        self.T_ground_camera: SE3 | None = None
+
+    def add(self, stamped: Stamped) -> Iterator[Event]:
+        """Take in one message of one robot."""
+        match stamped.message:
+            case MavImage() as image:
+                yield from self._add_mav_image(image)
+            case GroundImage() as image:
+                yield from self._add_ground_image(image)
+            case ImuSamples() as samples:
+                front_ends = self._front_ends
+                front_end = front_ends.mav if stamped.robot == Source.MAV else front_ends.ground
+                front_end.add_imu(samples)
+            case MagneticSamples() as samples:
+                self._magnetic[stamped.robot].append(samples)
+
+    def flush(self) -> Iterator[Event]:
+        """Finish what is under construction at the end of a recording."""
+        yield from self._dense.flush()
+
+    def relative_heading(self) -> float | None:
+        """Turn of the frame `mav` in `ground` by the magnetometers [rad], None before both know."""
+        mav, ground = (self._north[robot].heading() for robot in (Source.MAV, Source.GROUND))
+        if mav is None or ground is None:
+            return None
+        return float(np.angle(np.exp(1j * (ground - mav))))
+
+    def _add_mav_image(self, image: MavImage) -> Iterator[Event]:
+        pose = self._front_ends.mav.track(image)
+        self.T_mav_camera = pose.T_map_camera
+        if pose.T_map_camera is None:
+            yield TrackingLost(image.stamp_ns, Source.MAV)
+            return
+        yield MavTracked(image.stamp_ns, pose.T_map_camera)
+        self._take_bearing(Source.MAV, pose.T_map_camera)
+        yield from self._dense.add(image.stamp_ns, image.image, pose.T_map_camera)
+
+    def _add_ground_image(self, image: GroundImage) -> Iterator[Event]:
+        pose = self._front_ends.ground.track(image)
+        self.T_ground_camera = pose.T_map_camera
+        if pose.T_map_camera is None:
+            yield TrackingLost(image.stamp_ns, Source.GROUND)
+            return
+        yield GroundTracked(image.stamp_ns, pose.T_map_camera)
+        self._take_bearing(Source.GROUND, pose.T_map_camera)
+        if self.ground_map.wants(pose.T_map_camera):
+            self.ground_map.add(image, pose.T_map_camera)
+            yield GroundMapExtended(image.stamp_ns, self.ground_map.keyframes)
+
+    def _take_bearing(self, robot: Source, T_map_camera: SE3) -> None:
+        """Turn the magnetic field measured since the last image into the robot's map."""
+        R_camera_imu = self._calibration[robot].T_imu_camera.rotation.T
+        for samples in self._magnetic[robot]:
+            self._north[robot].add(samples.field, T_map_camera.rotation @ R_camera_imu)
+        self._magnetic[robot].clear()
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """All that locating one aerial surface needs; a snapshot of both maps at its time.
+
+    Attributes:
+        surface: What the MAV saw.
+        ground_cloud: The ground robot's map by then, in `ground`.
+        T_mav_camera: The MAV's camera when the surface became known.
+        T_ground_camera: The ground robot's camera then.
+        heading: Turn of `mav` in `ground` by the magnetometers [rad], None if unknown.
+    """
+
+    surface: AerialSurface
+    ground_cloud: PointCloud
+    T_mav_camera: SE3
+    T_ground_camera: SE3
+    heading: float | None
+
+
+def sight(surface: AerialSurface, mapping: Mapping) -> Sighting | None:
+    """The snapshot for a surface that was just cast; None while a robot is lost."""
+    if mapping.T_mav_camera is None or mapping.T_ground_camera is None:
+        return None
+    return Sighting(
+        surface,
+        mapping.ground_map.cloud(),
+        mapping.T_mav_camera,
+        mapping.T_ground_camera,
+        mapping.relative_heading(),
+    )
+
+
+class Pipeline:
+    """Figure 4: map with both robots, locate the one in the other's map, refine, augment.
+
+    Args:
+        config: The pipeline's parameters.
+        mav, ground: What is known about the robots' sensors.
+        front_ends: Who says where the cameras are.
+        rng: The one source of randomness.
+        T_ground_mav_prior: Where given, refinement starts from it and the global search is
+            skipped (Sec. III).
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        mav: RobotCalibration,
+        ground: RobotCalibration,
+        front_ends: FrontEnds,
+        rng: np.random.Generator,
+        T_ground_mav_prior: SE3 | None = None,
+    ) -> None:
+        self._config = config
+        self.mapping = Mapping(config, mav, ground, front_ends)
+        self._localizer = MonteCarloLocalizer(config, rng)
+        self._augmentation = Augmentation(config.ground_mapping.voxel_m)
+        self._T_ground_mav = T_ground_mav_prior
+        self._has_prior = T_ground_mav_prior is not None
+
+    def run(self, messages: Iterable[Stamped]) -> Iterator[Event]:
+        """Process messages in time order; yields every stage's event as it finishes."""
+        for message in messages:
+            for event in self.mapping.add(message):
+                yield from self._react(event)
+        for event in self.mapping.flush():
+            yield from self._react(event)
+
+    def augmented_map(self) -> AugmentedMap:
+        """The ground map with everything that was aligned so far."""
+        return self._augmentation.map(self.mapping.ground_map.cloud())
+
+    def _react(self, event: Event) -> Iterator[Event]:
+        yield event
+        if isinstance(event, SurfaceCast):
+            sighting = sight(event.surface, self.mapping)
+            if sighting is not None:
+                yield from self._locate_and_augment(sighting)
+
+    def _locate_and_augment(self, sighting: Sighting) -> Iterator[Event]:
+        # Global localization (Sec. VI), unless somebody told where the MAV is.
+        if not self._has_prior:
+            yield from locate(self._localizer, sighting)
+            belief = self._localizer.belief
+            self._T_ground_mav = belief.T_ground_mav if belief and belief.converged else None
+        if self._T_ground_mav is None:
+            return
+
+        # Pose refinement (Sec. VII).
+        surface = sighting.surface
+        alignment = refine(
+            surface.stamp_ns,
+            self._T_ground_mav,
+            surface.cloud_mav,
+            sighting.ground_cloud,
+            self._config,
+        )
+        yield Aligned(surface.stamp_ns, alignment)
+        if not alignment.accepted:
+            return
+        self._T_ground_mav = alignment.T_ground_mav
+
+        # Map augmentation.
+        self._augmentation.add(surface, alignment.T_ground_mav)
+        yield MapAugmented(surface.stamp_ns, moved(surface.cloud_mav, alignment.T_ground_mav))
+
+
+def locate(localizer: MonteCarloLocalizer, sighting: Sighting) -> Iterator[Event]:
+    """Feed one sighting to a localizer (Sec. VI)."""
+    yield from localizer.update(
+        sighting.surface.stamp_ns,
+        sighting.surface.cloud_mav.points,
+        sighting.surface.T_mav_camera.translation,
+        sighting.ground_cloud.points,
+        sighting.T_ground_camera.translation[:2],
+        sighting.heading,
+    )
+
+
+def moved(cloud: PointCloud, T_a_b: SE3) -> PointCloud:
+    """A cloud in frame b, expressed in frame a."""
+    normals = None if cloud.normals is None else cloud.normals @ T_a_b.rotation.T
+    return PointCloud((T_a_b @ cloud.points).astype(np.float32), cloud.colours, normals)
