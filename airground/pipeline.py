@@ -39,7 +39,7 @@ from airground.ground_map import GroundMap
 from airground.localization.heading import HeadingEstimator
 from airground.localization.particle_filter import MonteCarloLocalizer
 from airground.refinement import refine
-from airground.slam.front_end import FrontEnd
+from airground.slam.front_end import FrontEnd, TrackedPose
 
 
 @dataclass(frozen=True)
@@ -68,8 +68,8 @@ class Mapping:
         self._magnetic: dict[Source, list[MagneticSamples]] = {Source.MAV: [], Source.GROUND: []}
         self._north = {Source.MAV: HeadingEstimator(), Source.GROUND: HeadingEstimator()}
         self.ground_map = GroundMap(ground.camera, config.ground_mapping)
-        self.T_mav_camera: SE3 | None = None
-        self.T_ground_camera: SE3 | None = None
+        self.mav_pose: TrackedPose | None = None
+        self.ground_pose: TrackedPose | None = None
 
     def add(self, stamped: Stamped) -> Iterator[Event]:
         """Take in one message of one robot."""
@@ -98,7 +98,7 @@ class Mapping:
 
     def _add_mav_image(self, image: MavImage) -> Iterator[Event]:
         pose = self._front_ends.mav.track(image)
-        self.T_mav_camera = pose.T_map_camera
+        self.mav_pose = pose
         if pose.T_map_camera is None:
             yield TrackingLost(image.stamp_ns, Source.MAV)
             return
@@ -108,7 +108,7 @@ class Mapping:
 
     def _add_ground_image(self, image: GroundImage) -> Iterator[Event]:
         pose = self._front_ends.ground.track(image)
-        self.T_ground_camera = pose.T_map_camera
+        self.ground_pose = pose
         if pose.T_map_camera is None:
             yield TrackingLost(image.stamp_ns, Source.GROUND)
             return
@@ -133,27 +133,32 @@ class Sighting:
     Attributes:
         surface: What the MAV saw.
         ground_cloud: The ground robot's map by then, in `ground`.
-        T_mav_camera: The MAV's camera when the surface became known.
-        T_ground_camera: The ground robot's camera then.
+        T_mav_camera: The MAV's camera when the surface became known, at `mav_stamp_ns`.
+        T_ground_camera: The ground robot's camera then, at `ground_stamp_ns`.
         heading: Turn of `mav` in `ground` by the magnetometers [rad], None if unknown.
     """
 
     surface: AerialSurface
     ground_cloud: PointCloud
+    mav_stamp_ns: int
     T_mav_camera: SE3
+    ground_stamp_ns: int
     T_ground_camera: SE3
     heading: float | None
 
 
 def sight(surface: AerialSurface, mapping: Mapping) -> Sighting | None:
     """The snapshot for a surface that was just cast; None while a robot is lost."""
-    if mapping.T_mav_camera is None or mapping.T_ground_camera is None:
+    mav, ground = mapping.mav_pose, mapping.ground_pose
+    if mav is None or mav.T_map_camera is None or ground is None or ground.T_map_camera is None:
         return None
     return Sighting(
         surface,
         mapping.ground_map.cloud(),
-        mapping.T_mav_camera,
-        mapping.T_ground_camera,
+        mav.stamp_ns,
+        mav.T_map_camera,
+        ground.stamp_ns,
+        ground.T_map_camera,
         mapping.relative_heading(),
     )
 

@@ -1,0 +1,114 @@
+"""The paper's experiments on recorded sightings: sequences (Fig. 11, 12), trials (Fig. 13, 14)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from airground.refinement import refine
+from sim.truth import Truth
+
+from airground.config import Config
+from airground.core.belief import Alignment, Belief
+from airground.core.events import BeliefUpdated, Event
+from airground.core.se3 import SE3
+from airground.localization.particle_filter import MonteCarloLocalizer
+from airground.pipeline import Sighting, locate
+from evaluation.relation import PoseError, pose_error, true_T_ground_mav
+from evaluation.timing import timed
+
+SEQUENCE_LENGTH = 12
+"""Aerial maps in a sequence (Sec. VIII-C)."""
+
+START_NOISE_M, START_NOISE_DEG = 0.2, 3.0
+"""Standard deviation per axis of a refinement trial's start (Sec. VIII-D)."""
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """One aerial map taken in by one sequence; error is NaN where nothing was estimated."""
+
+    belief: Belief
+    error_m: float
+
+
+@dataclass(frozen=True)
+class RefinementTrial:
+    """One alignment from a noisy start.
+
+    Attributes:
+        before, after: Errors of the start and of the result.
+        from_truth: Error of the result when started at the truth: the bound that drift and
+            map errors set.
+        alignment: What refinement said.
+        duration_ms: How long it took, preparation included.
+    """
+
+    before: PoseError
+    after: PoseError
+    from_truth: PoseError
+    alignment: Alignment
+    duration_ms: float
+
+
+def sequence_starts(sightings: int, sequences: int) -> list[int]:
+    """Where sequences begin: spread evenly over a flight, chosen by nothing else.
+
+    A flight with fewer than 12 aerial maps gives one sequence; what it lacks counts as failed.
+    """
+    last = max(0, sightings - SEQUENCE_LENGTH)
+    return sorted({round(start) for start in np.linspace(0, last, sequences)})
+
+
+def localize_sequence(
+    sightings: Sequence[Sighting], truth: Truth, config: Config, rng: np.random.Generator
+) -> Iterator[tuple[Event, float, Iteration | None]]:
+    """Start a new filter and feed it the sightings.
+
+    Yields every event with its time [ms], and with the iteration that it completes.
+    """
+    localizer = MonteCarloLocalizer(config, rng)
+    for sighting in sightings:
+        for event, duration_ms in timed(locate(localizer, sighting)):
+            iteration = None
+            if isinstance(event, BeliefUpdated):
+                error = pose_error(event.belief.T_ground_mav, sighting, truth)
+                iteration = Iteration(event.belief, error.horizontal_m)
+            yield event, duration_ms, iteration
+
+
+def noisy_start(T_ground_mav: SE3, T_mav_camera: SE3, rng: np.random.Generator) -> SE3:
+    """The true relation with noise on the MAV's camera pose, per axis as stated above."""
+    T_ground_camera = T_ground_mav @ T_mav_camera
+    turn = SE3.from_rotation_vector(np.deg2rad(rng.normal(0, START_NOISE_DEG, 3)))
+    T_noisy = SE3(
+        (turn @ SE3(T_ground_camera.rotation, np.zeros(3))).rotation,
+        T_ground_camera.translation + rng.normal(0, START_NOISE_M, 3),
+    )
+    return T_noisy @ T_mav_camera.inverse()
+
+
+def refine_sighting(
+    sighting: Sighting, truth: Truth, config: Config, rng: np.random.Generator
+) -> RefinementTrial:
+    """One refinement from a noisy start, and one from the truth."""
+    true = true_T_ground_mav(sighting, truth)
+    start = noisy_start(true, sighting.T_mav_camera, rng)
+    started = time.perf_counter()
+    alignment = _refined(sighting, start, config)
+    duration_ms = (time.perf_counter() - started) * 1e3
+    bound = _refined(sighting, true, config)
+    return RefinementTrial(
+        before=pose_error(start, sighting, truth),
+        after=pose_error(alignment.T_ground_mav, sighting, truth),
+        from_truth=pose_error(bound.T_ground_mav, sighting, truth),
+        alignment=alignment,
+        duration_ms=duration_ms,
+    )
+
+
+def _refined(sighting: Sighting, start: SE3, config: Config) -> Alignment:
+    surface = sighting.surface
+    return refine(surface.stamp_ns, start, surface.cloud_mav, sighting.ground_cloud, config)
