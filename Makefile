@@ -1,0 +1,34 @@
+# `make demo` on a bare Debian or Ubuntu leaves results/demo/report.html; the rest is in README.md.
+PYTHON_IN_VENV := .venv/bin/python
+READY := .venv/.ready
+
+.PHONY: demo setup test test-slow check format clean
+
+demo: $(READY)
+	rm -rf results/demo
+	.venv/bin/airground reproduce --quick --out results/demo
+
+setup: $(READY)
+
+# Again only after a change of the dependencies.
+$(READY): requirements.lock pyproject.toml scripts/setup
+	scripts/setup
+	@touch $@
+
+test: $(READY)
+	$(PYTHON_IN_VENV) -m pytest -q -m "not slow"
+
+test-slow: $(READY)
+	$(PYTHON_IN_VENV) -m pytest -q -m slow
+
+check: $(READY)
+	$(PYTHON_IN_VENV) -m ruff check .
+	$(PYTHON_IN_VENV) -m ruff format --check .
+	$(PYTHON_IN_VENV) -m mypy
+
+format: $(READY)
+	$(PYTHON_IN_VENV) -m ruff format .
+	$(PYTHON_IN_VENV) -m ruff check --fix .
+
+clean:
+	rm -rf .venv build dist .pytest_cache .ruff_cache .mypy_cache .hypothesis
