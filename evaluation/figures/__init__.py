@@ -1,0 +1,1 @@
+"""One figure a file; each takes data and returns a matplotlib Figure."""

@@ -1,0 +1,59 @@
+"""Boxplots of an error before and after refinement, for conditions side by side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from evaluation.figures.boxes import draw_box, log_axis, positions
+from evaluation.figures.style import PAPER, SERIES, styled
+from evaluation.statistics import quantile
+
+
+@dataclass(frozen=True)
+class BeforeAfter:
+    """Errors of the same trials before and after; NaN or inf where refinement failed."""
+
+    before: ArrayLike
+    after: ArrayLike
+
+
+@styled
+def before_after_figure(
+    trials: dict[str, BeforeAfter], title: str, paper: float, unit: str, floor: float
+) -> Figure:
+    """One group of boxes before, one after; the paper's median after as a line.
+
+    Args:
+        trials: Label of a condition -> its errors.
+        title: What is drawn, with its unit.
+        paper: The paper's median after refinement, in the unit of the errors.
+        unit: For the line's label.
+        floor: Smallest value on the axis.
+    """
+    figure = Figure(figsize=(4.6, 4.9), layout="constrained")
+    axes = figure.subplots()
+    log_axis(axes, [e for pair in trials.values() for e in (pair.before, pair.after)], floor)
+    low, high = axes.get_ylim()
+    axes.set_ylim(min(low, paper / 2), max(high, paper * 2))
+    for group, (label, pair) in enumerate(trials.items()):
+        offset, width = positions(len(trials), group, 0.7)
+        for x, values in ((0, pair.before), (1, pair.after)):
+            draw_box(axes, x + offset, values, width, SERIES[group])
+            median = quantile(values, 0.5)
+            if axes.get_ylim()[0] < median < axes.get_ylim()[1]:
+                axes.annotate(
+                    f"{median:.2g}", (x + offset, median), xytext=(0, 2.5),
+                    textcoords="offset points", ha="center", va="bottom", fontsize=8,
+                    weight="bold",
+                )  # fmt: skip
+        axes.plot([], [], color=SERIES[group], linewidth=6, alpha=0.6, label=label)
+    axes.plot([0.55, 1.45], [paper, paper], color=PAPER, linewidth=1.6, linestyle=(0, (5, 3)))
+    axes.text(0.53, paper, f"paper {paper:g} {unit}", color=PAPER, ha="right", va="center")
+    axes.set_xlim(-0.5, 1.5)
+    axes.set_xticks([0, 1], ["before ICP", "after ICP"])
+    axes.set_title(title, pad=16)
+    figure.legend(loc="outside upper left", fontsize=8.5)
+    return figure

@@ -1,0 +1,96 @@
+"""Fig. 6: single depth maps, the surface fused from them, and how wrong each is."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from evaluation.figures.style import (
+    DEPTH_COLOURS,
+    ERROR_COLOURS,
+    FAINT,
+    SERIES,
+    colour_map,
+    picture_axes,
+    styled,
+)
+from evaluation.showcase import Showcase
+
+SHOWN = 3
+"""Single depth maps shown beside the fused one."""
+
+
+@styled
+def depth_maps_figure(showcase: Showcase) -> Figure:
+    """Reference view, single and fused depth above; error and its distribution below."""
+    columns = min(SHOWN, len(showcase.depth_maps)) + 2
+    figure = Figure(figsize=(2.35 * columns, 4.15), layout="constrained")
+    axes = figure.subplots(2, columns)
+    depths = [made.depth for made in showcase.depth_maps[: columns - 2]] + [showcase.surface.depth]
+    errors = [*showcase.depth_errors[: columns - 2], showcase.surface_error]
+    titles = [f"depth map {i + 1}" for i in range(columns - 2)]
+    titles.append(f"fused from {showcase.surface.depth_maps}")
+
+    axes[0, 0].imshow(showcase.depth_maps[0].image, cmap="gray", vmin=0, vmax=255)
+    axes[0, 0].set_title("reference view")
+    picture_axes(axes[0, 0])
+    low, high = np.nanpercentile(np.concatenate([d.ravel() for d in depths]), [1, 99])
+    limit_mm = _robust_limit_mm(errors[-1])
+    for column, (depth, error, title) in enumerate(zip(depths, errors, titles, strict=True), 1):
+        shown = axes[0, column].imshow(depth, cmap=colour_map(DEPTH_COLOURS), vmin=low, vmax=high)
+        axes[0, column].set_title(title)
+        wrong = axes[1, column].imshow(
+            1e3 * error, cmap=colour_map(ERROR_COLOURS), vmin=0, vmax=limit_mm
+        )
+        axes[1, column].set_title(_error_title(error), fontsize=9, fontweight="normal")
+        picture_axes(axes[0, column])
+        picture_axes(axes[1, column])
+    figure.colorbar(shown, ax=axes[0, :], label="depth [m]", shrink=0.85, pad=0.01)
+    bar = figure.colorbar(wrong, ax=axes[1, 1:], extend="max", shrink=0.85, pad=0.01)
+    bar.set_label("distance to the\ntrue surface [mm]")
+    _distribution(axes[1, 0], errors)
+    return figure
+
+
+def completeness(error: NDArray) -> float:
+    """Share of the pixels that have a depth."""
+    return float(np.isfinite(error).mean())
+
+
+def _error_title(error: NDArray) -> str:
+    size = 1e3 * error[np.isfinite(error)]
+    if len(size) == 0:
+        return "nothing seen"
+    median, p90 = np.percentile(size, [50, 90])
+    return f"median {median:.1f}, 90 % {p90:.0f} mm\n{completeness(error):.0%} of pixels"
+
+
+def _robust_limit_mm(error: NDArray) -> float:
+    size = 1e3 * error[np.isfinite(error)]
+    wide = float(np.percentile(size, 95)) if len(size) else 20.0
+    return float(np.clip(np.ceil(wide / 5) * 5, 10, 60))
+
+
+def _distribution(axes: Axes, errors: list[NDArray]) -> None:
+    """Share of all pixels within an error: tells accuracy and completeness at once."""
+    steps_mm = np.geomspace(1, 200, 80)
+    for error in errors[:-1]:
+        axes.plot(steps_mm, _share_within(error, steps_mm), color=FAINT, linewidth=1.0)
+    axes.plot(steps_mm, _share_within(errors[-1], steps_mm), color=SERIES[0], linewidth=2.2)
+    axes.text(
+        0.03, 0.97, "fused", transform=axes.transAxes, color=SERIES[0], va="top", weight="bold"
+    )
+    axes.text(0.03, 0.86, "single", transform=axes.transAxes, color=FAINT, va="top", weight="bold")
+    axes.set_xscale("log")
+    axes.set_xticks([1, 10, 100], ["1", "10", "100"])
+    axes.set_ylim(0, 100)
+    axes.set_xlabel("error up to [mm]", fontsize=9)
+    axes.set_title("% of pixels within", fontsize=9, fontweight="normal")
+    axes.grid()
+
+
+def _share_within(error: NDArray, steps_mm: NDArray) -> NDArray:
+    ordered = np.sort(1e3 * error[np.isfinite(error)])
+    return 100 * np.searchsorted(ordered, steps_mm, side="right") / error.size

@@ -1,0 +1,81 @@
+"""One look for all figures: calm, legible small, safe for colour-blind readers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+SERIES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")
+"""Okabe and Ito's colours, one a condition."""
+PAPER = "#D62246"
+"""The paper's published values, everywhere."""
+INK = "#222222"
+FAINT = "#8A8F98"
+HOLE = "#E9EAEC"
+"""Cells and pixels without a value."""
+
+HEIGHT_COLOURS = "viridis"
+DEPTH_COLOURS = "viridis_r"
+ERROR_COLOURS = "magma_r"
+COST_COLOURS = "gray"
+
+STYLE: dict[str, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 10.0,
+    "axes.titlesize": 10.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelcolor": INK,
+    "axes.edgecolor": "#5A5F66",
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "axes.grid": False,
+    "grid.color": "#D9DCE0",
+    "grid.linewidth": 0.7,
+    "text.color": INK,
+    "xtick.color": "#3A3F45",
+    "ytick.color": "#3A3F45",
+    "legend.frameon": False,
+    "legend.fontsize": 9.0,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+    "figure.dpi": 100,
+    "pdf.fonttype": 42,
+    "svg.hashsalt": "airground",
+}
+
+styled = mpl.rc_context(STYLE)
+"""Decorator that gives a figure function this look."""
+
+PICTURE_DPI = 160
+
+
+def colour_map(name: str) -> mpl.colors.Colormap:
+    """A colour map that shows NaN as `HOLE`."""
+    return mpl.colormaps[name].with_extremes(bad=HOLE)
+
+
+def picture_axes(axes: Axes) -> None:
+    """Strip what a picture does not need."""
+    axes.set_xticks([])
+    axes.set_yticks([])
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+
+
+@styled
+def save_figure(figure: Figure, folder: Path, name: str) -> None:
+    """Write `name`.png and `name`.pdf; the same figure gives the same bytes."""
+    folder.mkdir(parents=True, exist_ok=True)
+    figure.savefig(folder / f"{name}.png", dpi=PICTURE_DPI, metadata={"Software": None})
+    figure.savefig(
+        folder / f"{name}.pdf",
+        dpi=PICTURE_DPI,
+        metadata={"CreationDate": None, "Producer": None, "Creator": None},
+    )

@@ -1,0 +1,51 @@
+"""Table I as a picture: what each stage takes here, beside the paper's."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
+from numpy.typing import NDArray
+
+from evaluation.figures.style import FAINT, PAPER, SERIES, styled
+from evaluation.published import TABLE_I
+
+
+@styled
+def timing_figure(durations_ms: dict[str, NDArray[np.float64]]) -> Figure:
+    """Median as a bar, 95th percentile as a whisker, the paper's average as a diamond.
+
+    Args:
+        durations_ms: Name of a stage -> (N,) durations [ms], N >= 1. Stages that were not
+            measured are left out unless the paper has a value.
+    """
+    stages = [s for s in TABLE_I if s.metric in durations_ms or s.published_ms is not None]
+    figure = Figure(figsize=(9.0, 0.36 * len(stages) + 1.3), layout="constrained")
+    axes = figure.subplots()
+    for row, stage in enumerate(stages):
+        measured = durations_ms.get(stage.metric)
+        if measured is not None and len(measured):
+            median, p95 = np.percentile(measured, [50, 95])
+            axes.barh(row, median, left=0, height=0.55, color=SERIES[0], alpha=0.75)
+            axes.hlines(row, median, p95, color=SERIES[0], linewidth=1.6)
+            axes.vlines(p95, row - 0.16, row + 0.16, color=SERIES[0], linewidth=1.6)
+        else:
+            axes.text(0.12, row, "not run", color=FAINT, va="center", fontsize=9)
+        if stage.published_ms is not None:
+            gpu = stage.processor == "GPU"
+            axes.plot(
+                stage.published_ms, row, "D", color=PAPER, markersize=7, zorder=5,
+                markerfacecolor="white" if gpu else PAPER, markeredgewidth=1.6,
+            )  # fmt: skip
+    axes.set_xscale("log")
+    axes.set_xlim(0.1, 2e4)
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.set_yticks(range(len(stages)), [stage.title for stage in stages])
+    axes.invert_yaxis()
+    axes.set_xlabel("time [ms]")
+    axes.grid(axis="x")
+    axes.bar(0, 0, color=SERIES[0], alpha=0.75, label="here: median, whisker to 95 %")
+    axes.plot([], [], "D", color=PAPER, label="paper, CPU")
+    axes.plot([], [], "D", color=PAPER, markerfacecolor="white", label="paper, GPU")
+    figure.legend(loc="outside upper left", ncols=3)
+    return figure
