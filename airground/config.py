@@ -116,6 +116,8 @@ class Localization(Section):
     """Headings tried over the full circle when searched."""
     heading_noise_deg: Positive = 1.0
     """Standard deviation of the heading's motion model when searched [deg]."""
+    estimate: Literal["mean", "mode"] = "mode"
+    """Report the mean of all particles, or of those around the densest place."""
     redrawn_fraction: Fraction = 0.1
     """Share of the particles drawn anew from the current cost map at each update."""
     converged_spread_m: Positive = 0.15
@@ -176,6 +178,7 @@ def paper() -> Config:
             cost="zmssd",
             sigma=0.08,
             min_overlap=0.5,
+            estimate="mean",
             redrawn_fraction=0.0,
             max_cost=1.0,
         ),

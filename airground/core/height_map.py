@@ -1,0 +1,87 @@
+"""From points to height maps: the projection that makes two robots' views comparable."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from airground.core.belief import HeightMap
+
+
+def make_height_map(
+    points: NDArray,
+    cells_per_m: float,
+    dilate_holes: bool = True,
+    window: tuple[ArrayLike, ArrayLike] | None = None,
+) -> HeightMap:
+    """Highest point over each cell of the ground plane (Sec. VI-A).
+
+    Cell centres lie at whole multiples of the cell size, so that two maps of one
+    resolution always share a lattice.
+
+    Args:
+        points: (N, 3) [m], z against gravity; points with a NaN are left out.
+        cells_per_m: Resolution.
+        dilate_holes: Fill each hole by the highest of its 3 x 3 neighbours; heights that
+            were measured stay as they are.
+        window: Lowest and highest (x, y) [m] that the map covers; around all points where
+            None.
+
+    Returns:
+        The map in the frame of the points; one empty cell where there are no points.
+    """
+    points = np.ascontiguousarray(points, np.float32)
+    if window is None:
+        seen = points[np.isfinite(points).all(axis=1), :2]
+        corners = (seen.min(axis=0), seen.max(axis=0)) if len(seen) else (np.zeros(2),) * 2
+    else:
+        corners = (np.asarray(window[0]), np.asarray(window[1]))
+    # Rounded exactly as the kernel rounds, float32 product included.
+    first, last = (
+        np.floor(corner.astype(np.float32) * np.float32(cells_per_m) + np.float32(0.5)).astype(int)
+        for corner in corners
+    )
+    heights = np.full(tuple(last - first + 1), np.nan, np.float32)
+    _raise_cells(points, first[0], first[1], np.float32(cells_per_m), heights)
+    if dilate_holes:
+        heights = _dilate_holes(heights)
+    return HeightMap(heights, first / cells_per_m, cells_per_m)
+
+
+def lattice_index(height_map: HeightMap) -> NDArray[np.int64]:
+    """(2,) the origin of a map on the lattice of whole multiples of its cell size."""
+    return np.rint(height_map.origin * height_map.cells_per_m).astype(np.int64)
+
+
+@njit(cache=True, error_model="numpy")
+def _raise_cells(
+    points: NDArray, first_x: int, first_y: int, cells_per_m: float, heights: NDArray
+) -> None:
+    half = np.float32(0.5)
+    for i in range(points.shape[0]):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        if not (np.isfinite(x) and np.isfinite(y) and np.isfinite(z)):
+            continue
+        ix = int(np.floor(x * cells_per_m + half)) - first_x
+        iy = int(np.floor(y * cells_per_m + half)) - first_y
+        inside = 0 <= ix < heights.shape[0] and 0 <= iy < heights.shape[1]
+        if inside and not z <= heights[ix, iy]:
+            heights[ix, iy] = z
+
+
+@njit(cache=True, error_model="numpy")
+def _dilate_holes(heights: NDArray) -> NDArray:
+    nx, ny = heights.shape
+    filled = heights.copy()
+    for ix in range(nx):
+        for iy in range(ny):
+            if not np.isnan(heights[ix, iy]):
+                continue
+            highest = np.float32(np.nan)
+            for jx in range(max(ix - 1, 0), min(ix + 2, nx)):
+                for jy in range(max(iy - 1, 0), min(iy + 2, ny)):
+                    if not heights[jx, jy] <= highest and not np.isnan(heights[jx, jy]):
+                        highest = heights[jx, jy]
+            filled[ix, iy] = highest
+    return filled

@@ -1,0 +1,190 @@
+"""Sums over the cells where an aerial and a ground height map overlap, and costs from them.
+
+Both costs need six sums over the overlap: the number of cells, the sums of the aerial and
+of the ground heights, of their squares, and of their products. Arrays of sums end in an
+axis of these six, in this order.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+COUNT, SUM_A, SUM_G, SUM_AA, SUM_GG, SUM_AG = range(6)
+KEEPS_NAN = {"contract", "reassoc", "arcp", "nsz"}
+
+
+@njit(cache=True, error_model="numpy")
+def zmssd(sums: NDArray, min_count: float) -> NDArray[np.float32]:
+    """Eq. 2 [m^2] for sums (N, 6); NaN where fewer than `min_count` cells overlap."""
+    costs = np.empty(len(sums), np.float32)
+    for i in range(len(sums)):
+        n, sum_a, sum_g, sum_aa, sum_gg, sum_ag = sums[i]
+        if n < min_count or n < 1:
+            costs[i] = np.nan
+            continue
+        # sum((d - mean d)^2) = sum d^2 - (sum d)^2 / n with d = a - g.
+        difference = sum_a - sum_g
+        squares = sum_aa + sum_gg - 2 * sum_ag
+        costs[i] = max(squares - difference * difference / n, 0.0) / (2 * n)
+    return costs
+
+
+@njit(cache=True, error_model="numpy")
+def one_minus_correlation(
+    sums: NDArray, min_count: float, min_relief_m: float
+) -> NDArray[np.float32]:
+    """1 - normalized correlation for sums (N, 6); NaN where fewer than `min_count` overlap.
+
+    Standard deviations below `min_relief_m` are replaced by it: the noise of flat ground
+    correlates with nothing.
+    """
+    floor = min_relief_m * min_relief_m
+    costs = np.empty(len(sums), np.float32)
+    for i in range(len(sums)):
+        n, sum_a, sum_g, sum_aa, sum_gg, sum_ag = sums[i]
+        if n < min_count or n < 1:
+            costs[i] = np.nan
+            continue
+        variance_a = max(sum_aa / n - (sum_a / n) ** 2, floor)
+        variance_g = max(sum_gg / n - (sum_g / n) ** 2, floor)
+        covariance = sum_ag / n - sum_a * sum_g / (n * n)
+        costs[i] = 1.0 - covariance / np.sqrt(variance_a * variance_g)
+    return costs
+
+
+@njit(cache=True, error_model="numpy", parallel=True, fastmath=KEEPS_NAN)
+def sums_at_positions(
+    aerial: NDArray[np.float32],
+    aerial_mask: NDArray[np.float32],
+    ground: NDArray[np.float32],
+    ground_mask: NDArray[np.float32],
+    shifts: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """The six sums (M, 6) for M fractional shifts of one map over another.
+
+    Ground heights are interpolated bilinearly between the filled ones of four cells, and
+    count where these carry at least half of the weight; so a whole shift counts the same
+    cells as the cost map.
+
+    Args:
+        aerial, ground: Heights [m] with 0 in holes.
+        aerial_mask, ground_mask: 1 where filled, 0 in holes.
+        shifts: (M, 2) index in `ground` of the aerial cell [0, 0] [cells].
+    """
+    sums = np.zeros((len(shifts), 6))
+    for p in prange(len(shifts)):
+        shift_x, shift_y = np.floor(shifts[p, 0]), np.floor(shifts[p, 1])
+        weight_x = np.float32(shifts[p, 0] - shift_x)
+        weight_y = np.float32(shifts[p, 1] - shift_y)
+        ix, iy = int(shift_x), int(shift_y)
+        row_first = max(0, -ix)
+        rows = min(aerial.shape[0], ground.shape[0] - 1 - ix) - row_first
+        first = max(0, -iy)
+        length = min(aerial.shape[1], ground.shape[1] - 1 - iy) - first
+        if rows <= 0 or length <= 0:
+            continue
+        for row in range(rows):
+            i, j = row_first + row, row_first + row + ix
+            _add_row(
+                aerial[i, first : first + length],
+                aerial_mask[i, first : first + length],
+                ground[j : j + 2, first + iy : first + iy + length + 1],
+                ground_mask[j : j + 2, first + iy : first + iy + length + 1],
+                weight_x,
+                weight_y,
+                sums[p],
+            )
+    return sums
+
+
+@njit(cache=True, error_model="numpy", fastmath=KEEPS_NAN)
+def _add_row(
+    heights: NDArray,
+    filled: NDArray,
+    ground: NDArray,
+    mask: NDArray,
+    weight_x: float,
+    weight_y: float,
+    sums: NDArray,
+) -> None:
+    """Add one row of the overlap; rows of `ground` and `mask` are the two neighbours in x."""
+    zero, half = np.float32(0), np.float32(0.5)
+    w00 = (np.float32(1) - weight_x) * (np.float32(1) - weight_y)
+    w01 = (np.float32(1) - weight_x) * weight_y
+    w10 = weight_x * (np.float32(1) - weight_y)
+    w11 = weight_x * weight_y
+    g0, g1, m0, m1 = ground[0], ground[1], mask[0], mask[1]
+    n, sum_a, sum_g, sum_aa, sum_gg, sum_ag = zero, zero, zero, zero, zero, zero
+    for i in range(len(heights)):
+        weight = w00 * m0[i] + w01 * m0[i + 1] + w10 * m1[i] + w11 * m1[i + 1]
+        height = w00 * g0[i] + w01 * g0[i + 1] + w10 * g1[i] + w11 * g1[i + 1]
+        valid = filled[i] if weight >= half else zero
+        g = height / weight if weight >= half else zero
+        a = heights[i]
+        n += valid
+        sum_a += valid * a
+        sum_g += valid * g
+        sum_aa += valid * a * a
+        sum_gg += valid * g * g
+        sum_ag += valid * a * g
+    sums[0] += n
+    sums[1] += sum_a
+    sums[2] += sum_g
+    sums[3] += sum_aa
+    sums[4] += sum_gg
+    sums[5] += sum_ag
+
+
+@njit(cache=True, error_model="numpy", parallel=True, fastmath=KEEPS_NAN)
+def sums_at_poses(
+    cells: NDArray[np.float32],
+    ground: NDArray[np.float32],
+    ground_mask: NDArray[np.float32],
+    poses: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """The six sums (M, 6) for M poses of a turned aerial map.
+
+    Args:
+        cells: (K, 3) filled aerial cells: x, y [cells] from the camera, height [m].
+        ground: Ground heights with 0 in holes, at least one empty cell around the edge.
+        ground_mask: 1 where filled.
+        poses: (M, 3) index of the camera in `ground` [cells], and heading [rad].
+    """
+    half, one = np.float32(0.5), np.float32(1)
+    last_x, last_y = np.float32(ground.shape[0] - 2), np.float32(ground.shape[1] - 2)
+    sums = np.zeros((len(poses), 6))
+    for p in prange(len(poses)):
+        x0, y0 = np.float32(poses[p, 0]), np.float32(poses[p, 1])
+        c, s = np.float32(np.cos(poses[p, 2])), np.float32(np.sin(poses[p, 2]))
+        total = sums[p]
+        for i in range(len(cells)):
+            # Clamped to the empty edge, where nothing counts.
+            x = min(max(x0 + c * cells[i, 0] - s * cells[i, 1], np.float32(0)), last_x)
+            y = min(max(y0 + s * cells[i, 0] + c * cells[i, 1], np.float32(0)), last_y)
+            ix, iy = int(x), int(y)
+            wx, wy = x - np.float32(ix), y - np.float32(iy)
+            w00, w01, w10, w11 = (one - wx) * (one - wy), (one - wx) * wy, wx * (one - wy), wx * wy
+            weight = (
+                w00 * ground_mask[ix, iy]
+                + w01 * ground_mask[ix, iy + 1]
+                + w10 * ground_mask[ix + 1, iy]
+                + w11 * ground_mask[ix + 1, iy + 1]
+            )
+            if weight < half:
+                continue
+            height = (
+                w00 * ground[ix, iy]
+                + w01 * ground[ix, iy + 1]
+                + w10 * ground[ix + 1, iy]
+                + w11 * ground[ix + 1, iy + 1]
+            )
+            g, a = height / weight, cells[i, 2]
+            total[0] += 1
+            total[1] += a
+            total[2] += g
+            total[3] += a * a
+            total[4] += g * g
+            total[5] += a * g
+    return sums

@@ -1,0 +1,230 @@
+"""The cost of laying an aerial height map over the ground robot's (Sec. VI-A, Eq. 2-3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import fft
+
+from airground.config import Localization
+from airground.core.belief import CostMap, HeightMap
+from airground.core.height_map import lattice_index
+from airground.localization.cost_kernels import (
+    COUNT,
+    SUM_A,
+    SUM_AA,
+    SUM_AG,
+    SUM_G,
+    SUM_GG,
+    one_minus_correlation,
+    sums_at_poses,
+    sums_at_positions,
+    zmssd,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Masked:
+    """Heights about their mean with 0 in holes, and the mask that tells holes from zeros.
+
+    float32 sums of squares lose the small differences that matter unless means go first.
+    """
+
+    heights: NDArray[np.float32]
+    mask: NDArray[np.float32]
+    mean: float
+
+
+def masked(heights: NDArray[np.float32], margin: int = 0) -> Masked:
+    """Split heights with NaN into values and mask, with `margin` empty cells around."""
+    filled = np.isfinite(heights)
+    mean = float(heights[filled].mean(dtype=np.float64)) if filled.any() else 0.0
+    values = np.where(filled, heights - np.float32(mean), np.float32(0))
+    mask = filled.astype(np.float32)
+    return Masked(np.pad(values, margin), np.pad(mask, margin), mean)
+
+
+def costs_of(sums: NDArray, aerial_cells: int, config: Localization) -> NDArray[np.float32]:
+    """(N,) costs of the configured kind for sums (N, 6) over the overlap.
+
+    Args:
+        sums: As in `cost_kernels`.
+        aerial_cells: Filled cells of the aerial map, of which `min_overlap` must overlap.
+        config: Cost, overlap rule and relief.
+    """
+    # "More than" the fraction (Sec. VI-A), where the number of cells is whole.
+    min_count = np.floor(config.min_overlap * aerial_cells) + 0.5
+    if config.cost == "zmssd":
+        return zmssd(sums, min_count)
+    return one_minus_correlation(sums, min_count, config.min_relief_m)
+
+
+class OffsetSearch:
+    """Costs of all whole-cell offsets at once, by correlations in the frequency domain.
+
+    Every sum over the overlap is a correlation of masked maps, so six products of spectra
+    give the exact cost of all offsets. The ground's spectra are kept for further headings.
+
+    Args:
+        ground: Height map in `ground`.
+        centre: (2,) middle of the searched square [m].
+        radius_m: Half its side [m].
+        reach_cells: (2, 2) first and last lattice index (from the camera) that aerial maps
+            may have.
+    """
+
+    def __init__(
+        self, ground: HeightMap, centre: ArrayLike, radius_m: float, reach_cells: NDArray
+    ) -> None:
+        scale = ground.cells_per_m
+        centre = np.asarray(centre, np.float64)
+        self.first = np.ceil((centre - radius_m) * scale - 1e-6).astype(np.int64)
+        self.shape = np.floor((centre + radius_m) * scale + 1e-6).astype(np.int64) - self.first + 1
+        self.cells_per_m = scale
+        self._reach = np.asarray(reach_cells, np.int64)
+        extent = self.shape + self._reach[1] - self._reach[0]
+        self._fft_shape = [fft.next_fast_len(int(n), real=True) for n in extent]
+        start = self.first + self._reach[0] - lattice_index(ground)
+        patch = masked(_window(ground.heights, start, extent))
+        self._spectra = self._transform(patch)
+
+    def sums(self, aerial: HeightMap) -> NDArray[np.float32]:
+        """(nx, ny, 6) sums over the overlap at every offset; heights are about the means."""
+        offset = lattice_index(aerial) - self._reach[0]
+        inside = (offset >= 0).all() and (
+            offset + aerial.heights.shape <= self._reach[1] - self._reach[0] + 1
+        ).all()
+        if not inside:
+            raise ValueError("the aerial map is larger than the reach that was told")
+        canvas = np.full(tuple(self._reach[1] - self._reach[0] + 1), np.nan, np.float32)
+        nx, ny = aerial.heights.shape
+        canvas[offset[0] : offset[0] + nx, offset[1] : offset[1] + ny] = aerial.heights
+        mask_a, a, aa = (spectrum.conj() for spectrum in self._transform(masked(canvas)))
+        mask_g, g, gg = self._spectra
+        sums = np.empty((*self.shape, 6), np.float32)
+        products = (mask_a * mask_g, a * mask_g, mask_a * g, aa * mask_g, mask_a * gg, a * g)
+        for index, product in enumerate(products):
+            correlation = fft.irfft2(product, self._fft_shape, overwrite_x=True)
+            sums[..., index] = correlation[: self.shape[0], : self.shape[1]]
+        np.rint(sums[..., COUNT], out=sums[..., COUNT])
+        return sums
+
+    def costs(self, aerial: HeightMap, config: Localization) -> NDArray[np.float32]:
+        """(nx, ny) cost at every offset, NaN where too little overlaps."""
+        sums = self.sums(aerial).reshape(-1, 6)
+        return costs_of(sums, aerial.filled_cells, config).reshape(self.shape)
+
+    def cost_map(self, aerial: HeightMap, heading: float, config: Localization) -> CostMap:
+        """The costs with their place in the frame `ground`."""
+        origin = self.first / self.cells_per_m
+        return CostMap(self.costs(aerial, config), origin, self.cells_per_m, heading, config.cost)
+
+    def _transform(self, patch: Masked) -> tuple[NDArray, NDArray, NDArray]:
+        images = (patch.mask, patch.heights, patch.heights**2)
+        mask, heights, squares = (fft.rfft2(image, self._fft_shape) for image in images)
+        return mask, heights, squares
+
+
+def compute_cost_map(
+    aerial: HeightMap, ground: HeightMap, centre: ArrayLike, heading: float, config: Localization
+) -> CostMap:
+    """Cost of every position u of the MAV within the search region (Eq. 2, Fig. 7c).
+
+    Args:
+        aerial: Heights around the MAV's camera (see `aerial_height_map`).
+        ground: Heights in `ground`, same resolution.
+        centre: (2,) the ground robot's position in `ground` [m].
+        heading: That the aerial map was turned by [rad]; recorded only.
+        config: Cost, overlap rule, search radius.
+    """
+    search = OffsetSearch(ground, centre, config.search_radius_m, reach_of(aerial))
+    return search.cost_map(aerial, heading, config)
+
+
+def reach_of(aerial: HeightMap) -> NDArray[np.int64]:
+    """(2, 2) first and last lattice index of a map."""
+    first = lattice_index(aerial)
+    return np.array([first, first + aerial.heights.shape - 1])
+
+
+@dataclass(frozen=True, eq=False)
+class Overlays:
+    """Overlaps of an aerial and a ground height map at single hypotheses.
+
+    Attributes:
+        sums: (M, 6) as in `cost_kernels`, heights about the maps' means.
+        mean_aerial, mean_ground: Those means [m].
+        aerial_cells: Filled cells of the aerial map.
+    """
+
+    sums: NDArray[np.float64]
+    mean_aerial: float
+    mean_ground: float
+    aerial_cells: int
+
+    def costs(self, config: Localization) -> NDArray[np.float32]:
+        """(M,) costs, NaN where too little overlaps."""
+        return costs_of(self.sums, self.aerial_cells, config)
+
+    def overlaps(self) -> NDArray[np.float64]:
+        """(M,) overlap as a fraction of the aerial map's filled cells."""
+        return self.sums[:, COUNT] / max(self.aerial_cells, 1)
+
+    def correlations(self) -> NDArray[np.float64]:
+        """(M,) normalized correlations of the heights, NaN without any overlap."""
+        count = self.sums[:, COUNT]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            covariance = self.sums[:, SUM_AG] - self.sums[:, SUM_A] * self.sums[:, SUM_G] / count
+            variance_a, variance_g = self._variances()
+            return covariance / count / np.sqrt(variance_a * variance_g)
+
+    def reliefs(self) -> NDArray[np.float64]:
+        """(M,) the smaller of both maps' standard deviations over the overlap [m]."""
+        return np.sqrt(np.minimum(*self._variances()))
+
+    def _variances(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        count = self.sums[:, COUNT]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            aerial = self.sums[:, SUM_AA] / count - (self.sums[:, SUM_A] / count) ** 2
+            ground = self.sums[:, SUM_GG] / count - (self.sums[:, SUM_G] / count) ** 2
+        return np.maximum(aerial, 1e-12), np.maximum(ground, 1e-12)
+
+    def height_offsets(self) -> NDArray[np.float64]:
+        """(M,) Delta z = mean ground - mean aerial height over the overlap [m] (Sec. VI-A)."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            difference = (self.sums[:, SUM_G] - self.sums[:, SUM_A]) / self.sums[:, COUNT]
+        return difference + self.mean_ground - self.mean_aerial
+
+
+def overlay_at(aerial: HeightMap, ground: HeightMap, positions: NDArray) -> Overlays:
+    """Lay the aerial map at M positions u (M, 2) [m] over the ground map, bilinearly."""
+    a, g = masked(aerial.heights), masked(ground.heights, margin=1)
+    origin = lattice_index(aerial) - lattice_index(ground) + 1
+    shifts = np.asarray(positions, np.float64) * ground.cells_per_m + origin
+    sums = sums_at_positions(a.heights, a.mask, g.heights, g.mask, shifts)
+    return Overlays(sums, a.mean, g.mean, aerial.filled_cells)
+
+
+def overlay_turned(aerial: HeightMap, ground: HeightMap, poses: NDArray) -> Overlays:
+    """The same for M poses (M, 3): x, y [m], and a turn of the aerial map [rad]."""
+    a, g = masked(aerial.heights), masked(ground.heights, margin=1)
+    ix, iy = np.nonzero(a.mask)
+    first = lattice_index(aerial)
+    cells = np.column_stack([ix + first[0], iy + first[1], a.heights[ix, iy]]).astype(np.float32)
+    poses = np.array(poses, np.float64)
+    poses[:, :2] = poses[:, :2] * ground.cells_per_m - lattice_index(ground) + 1
+    sums = sums_at_poses(cells, g.heights, g.mask, poses)
+    return Overlays(sums, a.mean, g.mean, aerial.filled_cells)
+
+
+def _window(heights: NDArray[np.float32], start: NDArray, extent: NDArray) -> NDArray[np.float32]:
+    """The cells from `start` over `extent`, NaN outside the map."""
+    window = np.full(tuple(extent), np.nan, np.float32)
+    low = np.maximum(start, 0)
+    high = np.minimum(start + extent, heights.shape)
+    if (low < high).all():
+        inside = tuple(slice(*pair) for pair in zip(low - start, high - start, strict=True))
+        window[inside] = heights[low[0] : high[0], low[1] : high[1]]
+    return window

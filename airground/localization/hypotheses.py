@@ -1,0 +1,123 @@
+"""All hypotheses at once: positions, and where it is unknown the heading too (Sec. VI-A)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from airground.config import Localization
+from airground.core.belief import CostMap, HeightMap
+from airground.core.height_map import lattice_index, make_height_map
+from airground.localization.cost_map import OffsetSearch, reach_of
+from airground.localization.particles import draw_cells
+
+COARSE_STEP_DEG = 4.0
+REFINED_MODES = 12
+
+
+@dataclass(frozen=True, eq=False)
+class CostVolume:
+    """Costs over headings and positions.
+
+    Attributes:
+        headings: (H,) turn of `mav` in `ground` [rad], ascending.
+        costs: (H, nx, ny) float32, NaN where the overlap is too small.
+        origin: (2,) the position of cell [0, 0] in `ground` [m].
+        cells_per_m: Resolution.
+    """
+
+    headings: NDArray[np.float64]
+    costs: NDArray[np.float32]
+    origin: NDArray[np.float64]
+    cells_per_m: float
+
+    @property
+    def feasible(self) -> bool:
+        """Whether any hypothesis overlaps enough."""
+        return bool(np.isfinite(self.costs).any())
+
+    def cost_map(self, cost: str) -> CostMap:
+        """The slice of the heading with the lowest cost."""
+        best = 0
+        if self.feasible:
+            best = int(np.unravel_index(np.nanargmin(self.costs), self.costs.shape)[0])
+        heading = float(self.headings[best])
+        return CostMap(self.costs[best], self.origin, self.cells_per_m, heading, cost)
+
+    def span(self) -> float:
+        """Highest minus lowest cost; 1 where that says nothing."""
+        if not self.feasible:
+            return 1.0
+        return float(np.nanmax(self.costs) - np.nanmin(self.costs)) or 1.0
+
+    def draw(self, count: int, sigma: float, rng: np.random.Generator) -> NDArray[np.float64]:
+        """(count, 3) hypotheses by Eq. 5, spread evenly within their cells; uniform if none fit."""
+        costs = self.costs if self.feasible else np.zeros_like(self.costs)
+        turn, ix, iy = draw_cells(costs, sigma, count, rng)
+        cells = np.column_stack([ix, iy]) + rng.uniform(-0.5, 0.5, (count, 2))
+        return np.column_stack([self.origin + cells / self.cells_per_m, self.headings[turn]])
+
+
+def search_positions(
+    aerial: HeightMap, ground: HeightMap, centre: ArrayLike, heading: float, config: Localization
+) -> CostVolume:
+    """Every position within the search region for a known heading (Eq. 2)."""
+    search = OffsetSearch(ground, centre, config.search_radius_m, reach_of(aerial))
+    costs = search.costs(aerial, config)[None]
+    return CostVolume(
+        np.array([heading]), costs, search.first / search.cells_per_m, search.cells_per_m
+    )
+
+
+def search_headings(
+    aerial: HeightMap, ground: HeightMap, centre: ArrayLike, config: Localization
+) -> CostVolume:
+    """Every position for headings all around, coarse to fine.
+
+    Headings 4 degrees apart are searched first; between the most promising of them all
+    are. Costs are exact for each heading that the volume holds.
+
+    Args:
+        aerial: Heights around the camera for heading 0.
+        ground, centre, config: As for `search_positions`.
+    """
+    cells = _cells(aerial)
+    reach = int(np.ceil(np.linalg.norm(cells[:, :2], axis=1).max() * aerial.cells_per_m)) + 1
+    reach_cells = np.array([[-reach, -reach], [reach, reach]])
+    search = OffsetSearch(ground, centre, config.search_radius_m, reach_cells)
+    step = max(1, int(COARSE_STEP_DEG / 360.0 * config.headings))
+    found: dict[int, NDArray[np.float32]] = {}
+    for turn in range(0, config.headings, step):
+        found[turn] = _costs_turned(search, cells, turn, aerial.cells_per_m, config)
+    if step > 1:
+        lowest = {turn: np.nanmin(c) for turn, c in found.items() if np.isfinite(c).any()}
+        for turn in sorted(lowest, key=lambda t: lowest[t])[:REFINED_MODES]:
+            for near in range(turn - step + 1, turn + step):
+                fine = near % config.headings
+                if fine not in found:
+                    found[fine] = _costs_turned(search, cells, fine, aerial.cells_per_m, config)
+    turns = sorted(found)
+    headings = np.array(turns) * 2 * np.pi / config.headings
+    costs = np.stack([found[turn] for turn in turns])
+    return CostVolume(headings, costs, search.first / search.cells_per_m, search.cells_per_m)
+
+
+def _cells(aerial: HeightMap) -> NDArray[np.float32]:
+    """(K, 3) centres and heights of the filled cells."""
+    ix, iy = np.nonzero(np.isfinite(aerial.heights))
+    xy = (np.column_stack([ix, iy]) + lattice_index(aerial)) / aerial.cells_per_m
+    return np.column_stack([xy, aerial.heights[ix, iy]]).astype(np.float32)
+
+
+def _costs_turned(
+    search: OffsetSearch, cells: NDArray, turn: int, cells_per_m: float, config: Localization
+) -> NDArray[np.float32]:
+    angle = 2 * np.pi * turn / config.headings
+    c, s = np.float32(np.cos(angle)), np.float32(np.sin(angle))
+    turned = cells.copy()
+    turned[:, 0] = c * cells[:, 0] - s * cells[:, 1]
+    turned[:, 1] = s * cells[:, 0] + c * cells[:, 1]
+    # Turned lattices leave pinholes, which the dilation closes.
+    return search.costs(make_height_map(turned, cells_per_m), config)

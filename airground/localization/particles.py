@@ -1,0 +1,62 @@
+"""The particle set's arithmetic: draw, weigh, resample, summarize (Eq. 4-6)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+MODE_RADIUS_M = 0.25
+
+
+def likelihoods(costs: NDArray, sigma: float) -> NDArray[np.float64]:
+    """Eq. 5 relative to the lowest cost, so that nothing underflows; NaN stays NaN."""
+    costs = np.asarray(costs, np.float64)
+    if not np.isfinite(costs).any():
+        return np.full(costs.shape, np.nan)
+    return np.exp(-(costs - np.nanmin(costs)) / sigma)
+
+
+def weights(costs: NDArray, sigma: float) -> NDArray[np.float64]:
+    """(M,) normalized weights of particles by their costs.
+
+    A particle outside the overlap rule (NaN) gets the median weight of the others: one map
+    that overlaps too little must not kill the right hypothesis. Where nothing overlaps
+    enough, all weigh the same.
+    """
+    weight = likelihoods(costs, sigma)
+    feasible = np.isfinite(weight)
+    if not feasible.any():
+        return np.full(len(weight), 1.0 / len(weight))
+    weight[~feasible] = np.median(weight[feasible])
+    return weight / weight.sum()
+
+
+def resample(weight: NDArray, rng: np.random.Generator) -> NDArray[np.int64]:
+    """(M,) indices by low-variance systematic resampling of normalized weights (M,)."""
+    m = len(weight)
+    cumulative = np.cumsum(weight)
+    pointers = (rng.random() + np.arange(m)) / m * cumulative[-1]
+    return np.minimum(np.searchsorted(cumulative, pointers, side="right"), m - 1)
+
+
+def draw_cells(
+    costs: NDArray, sigma: float, count: int, rng: np.random.Generator
+) -> tuple[NDArray[np.int64], ...]:
+    """Indices of `count` cells of a cost array, drawn by Eq. 5; some cost must be finite."""
+    density = np.nan_to_num(likelihoods(costs, sigma), nan=0.0)
+    cumulative = np.cumsum(density.ravel())
+    chosen = np.searchsorted(cumulative, rng.random(count) * cumulative[-1], side="right")
+    return np.unravel_index(np.minimum(chosen, density.size - 1), costs.shape)
+
+
+def mean_pose(particles: NDArray) -> NDArray[np.float64]:
+    """(3,) mean of x, y and circular mean of the heading of particles (M, 3)."""
+    heading = np.angle(np.exp(1j * particles[:, 2]).mean())
+    return np.array([*particles[:, :2].mean(axis=0), heading])
+
+
+def densest_mode(particles: NDArray) -> NDArray[np.bool_]:
+    """(M,) which particles lie around the one that has the most neighbours (in x, y)."""
+    difference = particles[:, None, :2] - particles[None, :, :2]
+    near = (difference**2).sum(axis=2) < MODE_RADIUS_M**2
+    return near[np.argmax(near.sum(axis=1))]
