@@ -1,0 +1,251 @@
+"""The house rules that a reader of the code relies on, read from the source itself."""
+
+from __future__ import annotations
+
+import ast
+import sys
+import tomllib
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+ROOMS = ("airground", "sim", "evaluation")
+STAGES = ("slam", "dense", "localization", "refinement", "augmentation", "ground_map")
+"""Modules and packages of `airground` that only `pipeline.py` may bring together."""
+SHARED = ("core", "config", "errors")
+"""What a stage may import from `airground`."""
+MEETING_PLACE = "airground/pipeline.py"
+MAX_LINES = 350
+
+DISTRIBUTION_OF = {
+    "OpenGL": "pyopengl",
+    "PIL": "pillow",
+    "cv2": "opencv-python-headless",
+    "rerun": "rerun-sdk",
+    "skimage": "scikit-image",
+    "small_gicp": "small-gicp",
+    "tomli_w": "tomli-w",
+}
+"""Imports whose package is called otherwise."""
+
+
+def sources(*folders: str) -> list[str]:
+    """Every Python file below the folders, relative to the repository."""
+    files = [file for folder in folders for file in (ROOT / folder).rglob("*.py")]
+    return sorted(str(file.relative_to(ROOT)) for file in files)
+
+
+@cache
+def tree(file: str) -> ast.Module:
+    return ast.parse((ROOT / file).read_text(encoding="utf-8"), filename=file)
+
+
+def imports(file: str) -> Iterator[str]:
+    """Dotted names of all that a file imports, wherever in the file it does."""
+    for node in ast.walk(tree(file)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{file}:{node.lineno}: relative import"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def importing(files: list[str], *forbidden: str) -> list[str]:
+    """ "file imports name", for every import of a forbidden module or of one inside it."""
+    return [
+        f"{file} imports {name}"
+        for file in files
+        for name in imports(file)
+        if any(f"{name}.".startswith(f"{module}.") for module in forbidden)
+    ]
+
+
+def test_airground_knows_neither_simulator_nor_evaluator_nor_viewer() -> None:
+    forbidden = ("sim", "evaluation", "mujoco", "rerun", "matplotlib", "pyrender", "tests")
+    assert importing(sources("airground"), *forbidden) == []
+
+
+def test_sim_imports_only_core_io_and_errors() -> None:
+    allowed = ("airground.core.", "airground.io.", "airground.errors.")
+    wrong = [
+        f"{file} imports {name}"
+        for file in sources("sim")
+        for name in imports(file)
+        if f"{name}.".startswith("airground.") and not f"{name}.".startswith(allowed)
+    ]
+    assert wrong == []
+    assert importing(sources("sim"), "evaluation", "tests") == []
+
+
+def test_stages_do_not_import_each_other() -> None:
+    wrong = []
+    for file in sources("airground"):
+        stage = Path(file).parts[1].removesuffix(".py")
+        if stage in STAGES:
+            allowed = tuple(f"airground.{name}." for name in (*SHARED, stage))
+            wrong += [
+                f"{file} imports {name}"
+                for name in imports(file)
+                if name.startswith("airground.") and not f"{name}.".startswith(allowed)
+            ]
+    assert wrong == []
+
+
+def test_core_imports_nothing_else_of_ours() -> None:
+    wrong = [
+        f"{file} imports {name}"
+        for file in sources("airground/core")
+        for name in imports(file)
+        if name.startswith("airground.")
+        and not f"{name}.".startswith(("airground.core.", "airground.errors."))
+    ]
+    assert wrong == []
+
+
+def test_every_part_of_airground_has_a_known_place() -> None:
+    """A new stage must be named above, or the rules would pass it by."""
+    known = {*STAGES, *SHARED, "io", "pipeline", "__init__"}
+    parts = {Path(file).parts[1].removesuffix(".py") for file in sources("airground")}
+    assert parts - known == set()
+    assert (ROOT / MEETING_PLACE).exists()
+
+
+def strings(file: str) -> Iterator[tuple[int, str]]:
+    """Text in the code, docstrings apart."""
+    docstrings = set()
+    for node in ast.walk(tree(file)):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            docstrings |= {
+                id(child.value)
+                for child in body
+                if isinstance(child, ast.Expr) and isinstance(child.value, ast.Constant)
+            }
+    for node in ast.walk(tree(file)):
+        if not isinstance(node, ast.Constant) or id(node) in docstrings:
+            continue
+        if isinstance(node.value, str):
+            yield node.lineno, node.value
+
+
+def test_airground_never_names_the_truth() -> None:
+    """No path, key or variable of `airground` leads to what only the evaluator may know."""
+    wrong = []
+    for file in sources("airground"):
+        wrong += [f"{file}:{n}: {text!r}" for n, text in strings(file) if "truth" in text.lower()]
+        for node in ast.walk(tree(file)):
+            name = getattr(node, "id", None) or getattr(node, "attr", None)
+            name = name or getattr(node, "arg", None) or getattr(node, "name", None)
+            if isinstance(name, str) and ("truth" in name.lower() or "world" in name.lower()):
+                wrong.append(f"{file}:{getattr(node, 'lineno', 0)}: {name}")
+    assert wrong == []
+
+
+def calls(file: str) -> Iterator[tuple[int, str]]:
+    for node in ast.walk(tree(file)):
+        if isinstance(node, ast.Call):
+            yield node.lineno, ast.unparse(node.func)
+
+
+def test_nothing_executes_what_it_reads() -> None:
+    """No pickle, eval, exec or shell: a recording from a stranger is only data."""
+    assert importing(sources(*ROOMS), "pickle", "marshal", "shelve", "dill", "joblib") == []
+    forbidden = {"eval", "exec", "compile", "os.system", "yaml.load", "__import__"}
+    wrong = [f"{f}:{n}: {c}" for f in sources(*ROOMS) for n, c in calls(f) if c in forbidden]
+    assert wrong == []
+    for file in sources(*ROOMS):
+        for node in ast.walk(tree(file)):
+            if isinstance(node, ast.keyword) and node.arg in ("allow_pickle", "shell"):
+                assert ast.unparse(node.value) == "False", f"{file}:{node.value.lineno}"
+
+
+def test_libraries_do_not_print_or_exit() -> None:
+    """Only the command line speaks to the screen; libraries log or raise."""
+    wrong = [
+        f"{file}:{line}: {call}"
+        for file in sources("airground", "sim")
+        for line, call in calls(file)
+        if call in ("print", "exit", "quit", "sys.exit", "os._exit")
+    ]
+    assert wrong == []
+
+
+def test_randomness_comes_from_a_generator_passed_in() -> None:
+    allowed = ("default_rng", "Generator", "SeedSequence", "PCG64")
+    seeded = ("np.random.default_rng(", "np.random.SeedSequence(")
+    wrong = [
+        f"{file}:{line}: {call}"
+        for file in sources(*ROOMS)
+        for line, call in calls(file)
+        if call.startswith(("np.random.", "random."))
+        and not call.endswith(allowed)
+        and not call.startswith(seeded)
+    ]
+    assert wrong == []
+    seeded_inside = [
+        f"{file}:{line}"
+        for file in sources("airground")
+        for line, call in calls(file)
+        if call.endswith("default_rng")
+    ]
+    assert seeded_inside == []
+
+
+@pytest.mark.parametrize("file", sources(*ROOMS, "tests"))
+def test_files_stay_readable(file: str) -> None:
+    lines = (ROOT / file).read_text(encoding="utf-8").splitlines()
+    assert len(lines) <= MAX_LINES, f"{file} has {len(lines)} lines"
+
+
+@pytest.mark.parametrize("file", sources(*ROOMS))
+def test_modules_and_public_names_are_documented(file: str) -> None:
+    assert ast.get_docstring(tree(file)) is not None, f"{file} does not say what it is for"
+    bare = [
+        f"{file}:{node.lineno}: {node.name}"
+        for node in tree(file).body
+        if isinstance(node, ast.ClassDef | ast.FunctionDef)
+        and ast.get_docstring(node) is None
+        # A private name, a small class or a short function may say it all by itself.
+        and not (node.name.startswith("_") or len(node.body) <= 10)
+    ]
+    assert bare == []
+
+
+def test_every_import_is_a_declared_dependency() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    declared = {_distribution(line) for line in project["dependencies"]}
+    for_tests = declared | {_distribution(d) for d in project["optional-dependencies"]["dev"]}
+    assert _undeclared(sources(*ROOMS), declared) == []
+    assert _undeclared(sources("tests"), for_tests) == []
+
+
+def _undeclared(files: list[str], declared: set[str]) -> list[str]:
+    ours = {*ROOMS, "tests", "scenes", "__future__"}
+    wrong = []
+    for file in files:
+        for module in {name.partition(".")[0] for name in imports(file)}:
+            if module in ours or module in sys.stdlib_module_names:
+                continue
+            if DISTRIBUTION_OF.get(module, module).lower() not in declared:
+                wrong.append(f"{file} imports {module}")
+    return sorted(wrong)
+
+
+def _distribution(requirement: str) -> str:
+    for character in "<>=!~;[ ":
+        requirement = requirement.partition(character)[0]
+    return requirement.lower()
+
+
+def test_locked_packages_carry_names_versions_and_hashes_only() -> None:
+    lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+    lines = [line.strip().rstrip("\\").strip() for line in lock.splitlines()]
+    for line in lines:
+        kinds = ("#", "--hash=sha256:")
+        assert not line or line.startswith(kinds) or "==" in line, line
+        assert "://" not in line, line
+        assert not line.startswith(("-i", "--index", "--extra-index", "--find-links")), line
+    assert "pyopengl==3.1.10" in [line.partition(" ")[0] for line in lines]
