@@ -1,0 +1,1 @@
+"""Experiments, metrics, reports and the command line: the only room that knows all others."""

@@ -1,0 +1,1 @@
+"""MuJoCo scenes, the robots in them, their sensors and their recordings, with the truth."""

@@ -1,0 +1,1 @@
+"""Section V: depth maps from many close views, fused into a surface."""

@@ -1,0 +1,1 @@
+"""Recordings, trajectories and clouds on disk."""

@@ -1,0 +1,1 @@
+"""Section IV: where each robot's camera is."""
