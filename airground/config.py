@@ -30,9 +30,16 @@ class ViewSelection(Section):
     both_sides: bool = True
     """Also use the views before the reference, so that what one side hides the other sees."""
     max_views: Count = 16
-    """At most this many views a depth map; more are thinned evenly."""
+    """At most this many views a depth map: a view joins when it is far enough from the
+    others for this many to spread over the radius."""
     min_views: Count = 5
     """Fewer views than this make no depth map."""
+    min_baseline_m: Positive = 0.06
+    """Nor do views that all lie closer than this, across the line of sight [m]."""
+    depth_map_spacing_m: Positive = 0.12
+    """The next reference view is this far from the last [m]."""
+    min_depth_m: Positive = 0.5
+    """Nothing is reconstructed while the scene is closer than this (take-off) [m]."""
 
 
 class PlaneSweep(Section):
@@ -44,6 +51,14 @@ class PlaneSweep(Section):
     """Side of the window over which the photometric error is averaged [px, half resolution]."""
     truncation: Positive = 40.0
     """Absolute intensity difference above which a sample counts no more [grey levels]."""
+    smoothing: Literal["none", "semiglobal"] = "semiglobal"
+    """Whether costs are joined along image rows and columns before the winner is picked."""
+    step_penalty: Positive = 0.5
+    """Semi-global: cost of moving by one plane between neighbours [grey levels]."""
+    jump_penalty: Positive = 6.0
+    """Semi-global: cost of moving farther [grey levels] ..."""
+    edge_levels: Positive = 8.0
+    """... halved where the image changes by this much [grey levels]."""
     min_uniqueness: Fraction = 0.85
     """Best cost over the best cost elsewhere must be below this; 1 keeps everything."""
     max_curvature_sigma_m: Positive = 0.03
@@ -171,7 +186,7 @@ def paper() -> Config:
     return Config(
         preset="paper",
         view_selection=ViewSelection(both_sides=False),
-        plane_sweep=PlaneSweep(min_uniqueness=1.0),
+        plane_sweep=PlaneSweep(smoothing="none", min_uniqueness=1.0),
         fusion=Fusion(min_observations=1),
         height_maps=HeightMaps(cells_per_m=50.0),
         localization=Localization(

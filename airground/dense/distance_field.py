@@ -1,0 +1,129 @@
+"""Depth maps as distance fields, gathered in a histogram at every voxel (Sec. V).
+
+A depth map gives a voxel the value f = (depth seen there - depth of the voxel) / truncation,
+cut to [-1, 1]: positive before the surface, negative behind it. A voxel farther behind the
+surface than the truncation is hidden: it gets no vote. The eight counts of a voxel are
+packed into one 32-bit word, four bits each, so that a surface takes at most 15 depth maps.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from airground.core.surface import DepthMap
+from airground.dense.volume import Volume
+
+FAST = {"contract", "reassoc", "arcp", "nsz"}
+BINS = 8
+MAX_DEPTH_MAPS = 15
+
+
+def bin_centres() -> NDArray[np.float64]:
+    """(BINS,) the values c_j that the bins stand for, evenly spaced in [-1, 1]."""
+    return (2 * np.arange(BINS) + 1) / BINS - 1.0
+
+
+class FieldHistogram:
+    """n(v, j) of Eq. 1: how often each voxel got a value from each bin.
+
+    Attributes:
+        volume: The voxels.
+        truncation_m: Distance at which the field reaches -1 or 1.
+        counts: (rows, planes, columns) uint32, bin j in bits 4 j to 4 j + 3.
+        depth_maps: How many depth maps went in.
+    """
+
+    def __init__(
+        self, volume: Volume, truncation_m: float, memory: NDArray[np.uint32] | None = None
+    ) -> None:
+        self.volume = volume
+        self.truncation_m = truncation_m
+        if memory is None or memory.shape != volume.shape:
+            memory = np.empty(volume.shape, np.uint32)
+        memory.fill(0)
+        self.counts = memory
+        self.depth_maps = 0
+
+    def add(self, depth_map: DepthMap) -> None:
+        """Adds the distance field of one depth map.
+
+        Raises:
+            ValueError: The histogram's four bits are full.
+        """
+        if self.depth_maps >= MAX_DEPTH_MAPS:
+            raise ValueError(f"a histogram takes at most {MAX_DEPTH_MAPS} depth maps")
+        volume, camera = self.volume, depth_map.camera
+        T_map_volume = depth_map.T_mav_camera.inverse() @ volume.T_mav_camera
+        # homogeneous pixel of the map = z * matrix @ (x, y, 1) + shift
+        matrix = camera.matrix() @ T_map_volume.rotation @ np.linalg.inv(volume.camera.matrix())
+        shift = camera.matrix() @ T_map_volume.translation
+        flat = np.append(depth_map.depth.ravel(), np.float32(np.nan))
+        add_field(
+            self.counts,
+            flat,
+            camera.width,
+            camera.height,
+            matrix.astype(np.float32),
+            shift.astype(np.float32),
+            volume.depths().astype(np.float32),
+            np.float32(1.0 / self.truncation_m),
+        )
+        self.depth_maps += 1
+
+
+@njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
+def add_field(
+    counts: NDArray,
+    depth: NDArray,
+    width: int,
+    height: int,
+    matrix: NDArray,
+    shift: NDArray,
+    plane_depths: NDArray,
+    inverse_truncation: float,
+) -> None:
+    """Adds one vote at every voxel that the depth map sees, in its nearest pixel.
+
+    Args:
+        counts: (rows, planes, columns) uint32, added to.
+        depth: (height * width + 1,) float32, row by row, then one NaN for "outside".
+        width, height: Of the depth map.
+        matrix, shift: (3, 3) and (3,) float32: the voxel [y, k, x] lies at the homogeneous
+            pixel z_k matrix (x, y, 1) + shift of the depth map.
+        plane_depths: (planes,) float32.
+        inverse_truncation: [1/m].
+    """
+    rows, planes, columns = counts.shape
+    outside = width * height
+    half, one = np.float32(0.5), np.float32(1.0)
+    for y in prange(rows):
+        index = np.empty(columns, np.int32)
+        z = np.empty(columns, np.float32)
+        seen = np.empty(columns, np.float32)
+        base0 = matrix[0, 1] * np.float32(y) + matrix[0, 2]
+        base1 = matrix[1, 1] * np.float32(y) + matrix[1, 2]
+        base2 = matrix[2, 1] * np.float32(y) + matrix[2, 2]
+        for k in range(planes):
+            plane = plane_depths[k]
+            for x in range(columns):
+                column = np.float32(x)
+                w = plane * (matrix[2, 0] * column + base2) + shift[2]
+                inverse = one / w
+                u = (plane * (matrix[0, 0] * column + base0) + shift[0]) * inverse + half
+                v = (plane * (matrix[1, 0] * column + base1) + shift[1]) * inverse + half
+                z[x] = w
+                inside = (w > 0) & (u >= 0) & (u < width) & (v >= 0) & (v < height)
+                iu = np.int32(u) if inside else np.int32(0)
+                iv = np.int32(v) if inside else np.int32(0)
+                index[x] = iv * np.int32(width) + iu if inside else np.int32(outside)
+            for x in range(columns):
+                seen[x] = depth[index[x]]
+            row = counts[y, k]
+            for x in range(columns):
+                value = (seen[x] - z[x]) * inverse_truncation
+                visible = value >= -one
+                level = (min(value, np.float32(0.999)) + one) * np.float32(BINS / 2)
+                bits = np.uint32(4) * np.uint32(level if visible else np.float32(0))
+                row[x] = np.uint32(row[x]) + (np.uint32(visible) << bits)

@@ -1,0 +1,189 @@
+"""The photometric cost of depth planes, one view after another (Sec. V).
+
+A view is first turned so that it looks the way the reference does. What is left between
+the two is a translation, under which a plane parallel to the image is only scaled and
+shifted: every row is read in order, without gathering. The view is kept at the full
+resolution, each pixel averaged over 2 x 2, so that a sample at any position has the blur
+of the halved reference, and interpolating it adds next to none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.config import PlaneSweep as Parameters
+from airground.core.camera import PinholeCamera
+from airground.core.se3 import SE3
+from airground.dense import sweep_kernels as kernels
+
+
+def inverse_depth_planes(near_m: float, far_m: float, count: int) -> NDArray[np.float64]:
+    """(count,) depths [m] from near to far, evenly spaced in inverse depth."""
+    if not 0 < near_m < far_m:
+        raise ValueError(f"depth range must be 0 < near < far, got {near_m} to {far_m}")
+    return 1.0 / np.linspace(1.0 / near_m, 1.0 / far_m, count)
+
+
+def halved(image: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """The image averaged over 2 x 2 pixels, (height // 2, width // 2)."""
+    height, width = (n // 2 * 2 for n in image.shape)
+    blocks = image[:height, :width].astype(np.float32)
+    return 0.25 * (blocks[::2, ::2] + blocks[1::2, ::2] + blocks[::2, 1::2] + blocks[1::2, 1::2])
+
+
+@dataclass(frozen=True)
+class TurnedView:
+    """A view turned to look the way the reference does.
+
+    Attributes:
+        phases: (2, height, 2, width) float32: [row & 1, row >> 1, column & 1, column >> 1]
+            of the full-resolution image averaged over 2 x 2. Position u of the halved
+            camera is column 2 u.
+        valid: (2 * height, 2) int32: columns [lo, hi) of each row that the view covers.
+    """
+
+    phases: NDArray[np.float32]
+    valid: NDArray[np.int32]
+
+    @classmethod
+    def turn(
+        cls, image: NDArray[np.uint8], camera: PinholeCamera, R_view_reference: NDArray
+    ) -> TurnedView:
+        """Turns a full-resolution image of `camera`."""
+        matrix = camera.matrix()
+        homography = matrix @ R_view_reference @ np.linalg.inv(matrix)
+        size = (camera.width, camera.height)
+        flags = cv2.INTER_CUBIC | cv2.WARP_INVERSE_MAP
+        turned = cv2.warpPerspective(
+            image.astype(np.float32), homography, size, flags=flags, borderMode=cv2.BORDER_REPLICATE
+        )
+        inside = cv2.warpPerspective(
+            np.full(image.shape, 255, np.uint8),
+            homography,
+            size,
+            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+        )
+        height, width = camera.height // 2, camera.width // 2
+        mean = cv2.boxFilter(turned, -1, (2, 2), anchor=(0, 0), borderType=cv2.BORDER_REPLICATE)
+        blocks = mean[: 2 * height, : 2 * width].reshape(height, 2, width, 2)
+        phases = np.ascontiguousarray(blocks.transpose(1, 0, 3, 2))
+        return cls(phases, _row_limits(inside == 255)[: 2 * height])
+
+    def scaled(self, gain: float) -> TurnedView:
+        return TurnedView(self.phases * np.float32(gain), self.valid)
+
+
+def _row_limits(inside: NDArray[np.bool_]) -> NDArray[np.int32]:
+    """(rows, 2) columns [lo, hi) where the 2 x 2 mean that starts there is all inside."""
+    whole = np.zeros_like(inside)
+    whole[:-1, :-1] = inside[:-1, :-1] & inside[1:, :-1] & inside[:-1, 1:] & inside[1:, 1:]
+    lo = whole.argmax(axis=1)
+    hi = whole.shape[1] - whole[:, ::-1].argmax(axis=1)
+    hi[~whole.any(axis=1)] = 0
+    return np.stack([lo, hi], axis=1).astype(np.int32)
+
+
+class CostVolume:
+    """Photometric errors of one reference view at every pixel and plane, over several views.
+
+    Attributes:
+        costs: (height, planes, width) uint16, summed over views, sixteenths of grey levels.
+        limits: One (height, planes, 2) int16 a view: the columns [lo, hi) that it covers.
+    """
+
+    def __init__(self, height: int, planes: int, width: int) -> None:
+        self.costs = np.zeros((height, planes, width), np.uint16)
+        self.limits: list[NDArray[np.int16]] = []
+
+
+class PlaneSweep:
+    """Collects the evidence for the depth of one reference view.
+
+    Views before and after the reference have separate cost volumes where `sides` is 2:
+    what an edge hides from one side the other side sees.
+
+    Args:
+        image: (height, width) uint8, the reference at full resolution.
+        camera: Its camera, at full resolution.
+        T_mav_camera: Its pose.
+        depths: (planes,) [m], the hypotheses, evenly spaced in inverse depth.
+        parameters: The section `plane_sweep` of the configuration.
+        sides: Number of cost volumes.
+    """
+
+    def __init__(
+        self,
+        image: NDArray[np.uint8],
+        camera: PinholeCamera,
+        T_mav_camera: SE3,
+        depths: NDArray[np.float64],
+        parameters: Parameters,
+        sides: int,
+    ) -> None:
+        self.full_camera = camera
+        self.camera = camera.halved()
+        self.T_mav_camera = T_mav_camera
+        self.depths = depths
+        self.parameters = parameters
+        self.reference = halved(image)
+        shape = (self.camera.height, len(depths), self.camera.width)
+        self.volumes = [CostVolume(*shape) for _ in range(sides)]
+
+    @property
+    def views(self) -> int:
+        return sum(len(volume.limits) for volume in self.volumes)
+
+    def add(self, image: NDArray[np.uint8], T_mav_camera: SE3, side: int) -> None:
+        """Compares one more view with the reference at every plane."""
+        T_reference_view = self.T_mav_camera.inverse() @ T_mav_camera
+        view = TurnedView.turn(image, self.full_camera, T_reference_view.rotation.T)
+        view = view.scaled(self._gain(view, T_reference_view.translation))
+        column_scale, column_shift, row_scale, row_shift = self._plane_maps(
+            T_reference_view.translation
+        )
+        volume = self.volumes[side]
+        height, planes, width = volume.costs.shape
+        limits = np.empty((height, planes, 2), np.int16)
+        kernels.add_view(
+            volume.costs,
+            limits,
+            self.reference,
+            view.phases,
+            view.valid,
+            row_scale,
+            row_shift,
+            *kernels.plan_columns(column_scale, column_shift, width),
+            self.parameters.truncation,
+        )
+        volume.limits.append(limits)
+
+    def _plane_maps(self, centre: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+        """Scale and shift from reference pixels to the view's half pixels, plane by plane.
+
+        A point at depth z on the ray of column x is at depth z - c_z before the turned
+        view, whose centre is c: u = cx + (f (x - cx) z / f - f c_x) / (z - c_z).
+        """
+        camera = self.camera
+        scale = self.depths / (self.depths - centre[2])
+        x_shift = camera.cx * (1 - scale) - camera.fx * centre[0] / (self.depths - centre[2])
+        y_shift = camera.cy * (1 - scale) - camera.fy * centre[1] / (self.depths - centre[2])
+        return 2 * scale, 2 * x_shift, 2 * scale, 2 * y_shift
+
+    def _gain(self, view: TurnedView, centre: NDArray) -> float:
+        """The factor that gives the view the reference's brightness, at the middle plane."""
+        middle = len(self.depths) // 2
+        column_scale, column_shift, row_scale, row_shift = (
+            m[middle] / 2 for m in self._plane_maps(centre)
+        )
+        even = view.phases[0, :, 0, :]
+        matrix = np.array([[column_scale, 0, column_shift], [0, row_scale, row_shift]])
+        size = (self.camera.width, self.camera.height)
+        flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
+        moved = cv2.warpAffine(even, matrix, size, flags=flags, borderValue=-1)
+        seen = moved >= 0
+        total = float(moved[seen].sum())
+        return float(self.reference[seen].sum()) / total if total > 0 else 1.0

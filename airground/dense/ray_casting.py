@@ -1,0 +1,124 @@
+"""From the fused field to points: its zero level set seen from the reference view (Sec. V)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from airground.core.cloud import PointCloud
+from airground.core.surface import DepthMap
+from airground.dense.volume import Volume
+
+FAST = {"contract", "reassoc", "arcp", "nsz"}
+
+
+def cast_surface(
+    volume: Volume,
+    phi: NDArray[np.float32],
+    counts: NDArray[np.uint32],
+    min_observations: int,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Depth and normals of the surface in the volume's own view.
+
+    Args:
+        volume: The voxels.
+        phi: (rows, planes, columns) float32, the fused field, positive before the surface.
+        counts: (rows, planes, columns) uint32, the packed histogram.
+        min_observations: Depth maps that must have voted for a surface close to the point
+            (within the truncation), or there is no point.
+
+    Returns:
+        Depth (rows, columns) float32 [m], NaN where there is no surface, and unit normals
+        (rows, columns, 3) float32 in the camera's axes, pointing into free space.
+    """
+    height, _, width = volume.shape
+    depth = np.full((height, width), np.nan, np.float32)
+    normals = np.full((height, width, 3), np.nan, np.float32)
+    camera = volume.camera
+    intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
+    scan(phi, counts, volume.depths(), intrinsics, min_observations, depth, normals)
+    return depth, normals
+
+
+def surface_cloud(
+    volume: Volume, depth: NDArray[np.float32], normals: NDArray[np.float32], reference: DepthMap
+) -> PointCloud:
+    """The cast points in the MAV's map, with the grey values of the reference view."""
+    seen = np.isfinite(depth)
+    points = volume.camera.back_project(depth)[seen]
+    rows, columns = np.nonzero(seen)
+    image = reference.image
+    grey = image[
+        rows * image.shape[0] // depth.shape[0], columns * image.shape[1] // depth.shape[1]
+    ]
+    return PointCloud(
+        (volume.T_mav_camera @ points.astype(np.float64)).astype(np.float32),
+        np.repeat(grey[:, None], 3, axis=1),
+        (normals[seen].astype(np.float64) @ volume.T_mav_camera.rotation.T).astype(np.float32),
+    )
+
+
+@njit(cache=True, inline="always")
+def _votes_near_surface(word: int) -> int:
+    """Votes in all bins but the last, which says "free"."""
+    votes = 0
+    for j in range(7):
+        votes += (word >> (4 * j)) & 15
+    return votes
+
+
+@njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
+def scan(
+    phi: NDArray,
+    counts: NDArray,
+    plane_depths: NDArray,
+    intrinsics: NDArray,
+    min_observations: int,
+    depth: NDArray,
+    normals: NDArray,
+) -> None:
+    """Finds in each column the first supported change of phi from positive to negative."""
+    rows, planes, columns = phi.shape
+    fx, fy, cx, cy = intrinsics
+    for y in prange(rows):
+        up, down = max(np.int64(y) - 1, 0), min(np.int64(y) + 1, rows - 1)
+        open_columns = np.ones(columns, np.bool_)
+        for k in range(planes - 1):
+            here, behind = phi[y, k], phi[y, k + 1]
+            crossings = 0
+            for x in range(columns):
+                crossings += (here[x] > 0) & (behind[x] <= 0) & open_columns[x]
+            if crossings == 0:
+                continue
+            for x in range(columns):
+                if not (open_columns[x] and here[x] > 0 and behind[x] <= 0):
+                    continue
+                votes = max(
+                    _votes_near_surface(int(counts[y, k, x])),
+                    _votes_near_surface(int(counts[y, k + 1, x])),
+                )
+                if votes < min_observations:
+                    continue
+                open_columns[x] = False
+                fraction = here[x] / (here[x] - behind[x])
+                z = plane_depths[k] + fraction * (plane_depths[k + 1] - plane_depths[k])
+                depth[y, x] = z
+                left, right = max(x - 1, 0), min(x + 1, columns - 1)
+                near = k if fraction < 0.5 else k + 1
+                k0, k1 = max(k - 1, 0), min(k + 2, planes - 1)
+                gx = (phi[y, near, right] - phi[y, near, left]) / (right - left)
+                gy = (phi[down, near, x] - phi[up, near, x]) / (down - up)
+                gk = (phi[y, k1, x] - phi[y, k0, x]) / (plane_depths[k1] - plane_depths[k0])
+                # x = fx X / Z + cx: a step in Z at fixed X, Y also moves the pixel
+                nx, ny = gx * fx / z, gy * fy / z
+                nz = gk - gx * (x - cx) / z - gy * (y - cy) / z
+                norm = np.sqrt(nx * nx + ny * ny + nz * nz)
+                if norm > 0:
+                    normals[y, x, 0] = nx / norm
+                    normals[y, x, 1] = ny / norm
+                    normals[y, x, 2] = nz / norm
+                else:
+                    normals[y, x, 0] = 0.0
+                    normals[y, x, 1] = 0.0
+                    normals[y, x, 2] = -1.0

@@ -1,0 +1,132 @@
+"""The inner loops of the plane sweep.
+
+The cost volume is laid out [row, plane, column]: one image row's costs at all planes fit the
+cache, and everything runs along columns. Rows are independent, so results do not depend on
+how many threads share them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+FAST = {"contract", "reassoc", "arcp", "nsz"}
+COST_SCALE = 16.0
+"""Costs are stored in sixteenths of a grey level."""
+MAX_RUNS = 64
+"""More runs than this in a row mean a scale that no pair of neighbouring views has."""
+
+
+@njit(cache=True, error_model="numpy")
+def plan_columns(scale: NDArray, shift: NDArray, width: int) -> tuple[NDArray, NDArray, NDArray]:
+    """Where the columns of the reference fall in a view, plane by plane, as gather-free runs.
+
+    Column x falls on `scale * x + shift` (in half columns, see `ViewImage`). Over a run,
+    the whole part of that minus 2 x is constant, so that neighbours are read in order.
+
+    Returns:
+        starts: (planes, MAX_RUNS) int32, first column of each run, `width` past the last.
+        offsets: (planes, MAX_RUNS) int32, whole part minus 2 x.
+        fractions: (planes, width) float32 in [0, 1).
+    """
+    planes = len(scale)
+    starts = np.full((planes, MAX_RUNS), width, np.int32)
+    offsets = np.zeros((planes, MAX_RUNS), np.int32)
+    fractions = np.zeros((planes, width), np.float32)
+    for p in range(planes):
+        run = -1
+        for x in range(width):
+            u = scale[p] * x + shift[p]
+            whole = int(np.floor(u))
+            fractions[p, x] = u - whole
+            if run < 0 or whole - 2 * x != offsets[p, run]:
+                run += 1
+                if run >= MAX_RUNS:
+                    break
+                starts[p, run] = x
+                offsets[p, run] = whole - 2 * x
+    return starts, offsets, fractions
+
+
+@njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
+def add_view(
+    costs: NDArray,
+    limits: NDArray,
+    reference: NDArray,
+    phases: NDArray,
+    valid: NDArray,
+    row_scale: NDArray,
+    row_shift: NDArray,
+    starts: NDArray,
+    offsets: NDArray,
+    fractions: NDArray,
+    truncation: float,
+) -> None:
+    """Adds one view's truncated absolute differences to the cost volume.
+
+    Args:
+        costs: (height, planes, width) uint16, sixteenths of grey levels, added to.
+        limits: (height, planes, 2) int16, filled: columns [lo, hi) that the view covers.
+        reference: (height, width) float32.
+        phases: (2, height, 2, width) float32, the view's even and odd rows and columns.
+        valid: (2 * height, 2) int32, columns [lo, hi) of the view with data, row by row.
+        row_scale, row_shift: (planes,) float64, as scale and shift, for rows.
+        starts, offsets, fractions: What `plan_columns` returned.
+        truncation: Grey levels.
+    """
+    height, planes, width = costs.shape
+    cap = np.float32(truncation)
+    scale = np.float32(COST_SCALE)
+    for y in prange(height):
+        top_even = np.empty(width + 1, np.float32)
+        top_odd = np.empty(width + 1, np.float32)
+        for p in range(planes):
+            v = row_scale[p] * y + row_shift[p]
+            row = int(np.floor(v))
+            limits[y, p, 0] = 0
+            limits[y, p, 1] = 0
+            if row < 0 or row + 1 >= 2 * height:
+                continue
+            lo = max(valid[row, 0], valid[row + 1, 0])
+            hi = min(valid[row, 1], valid[row + 1, 1])
+            if hi - lo < 4:
+                continue
+            weight = np.float32(v - row)
+            even0 = phases[row & 1, row >> 1, 0]
+            odd0 = phases[row & 1, row >> 1, 1]
+            even1 = phases[(row + 1) & 1, (row + 1) >> 1, 0]
+            odd1 = phases[(row + 1) & 1, (row + 1) >> 1, 1]
+            for x in range(width):
+                top_even[x] = even0[x] + weight * (even1[x] - even0[x])
+            for x in range(width):
+                top_odd[x] = odd0[x] + weight * (odd1[x] - odd0[x])
+            first, last = width, 0
+            for run in range(MAX_RUNS):
+                begin = starts[p, run]
+                if begin >= width:
+                    break
+                end = starts[p, run + 1] if run + 1 < MAX_RUNS else width
+                offset = offsets[p, run]
+                # 2 x + offset >= lo and 2 x + offset + 1 < hi
+                begin = max(begin, (lo - offset + 1) >> 1)
+                end = min(end, (hi - offset - 2) // 2 + 1)
+                n = end - begin
+                if n <= 0:
+                    continue
+                first, last = min(first, begin), max(last, end)
+                i = begin + (offset >> 1)
+                if offset & 1:
+                    left, right = top_odd[i : i + n], top_even[i + 1 : i + 1 + n]
+                else:
+                    left, right = top_even[i : i + n], top_odd[i : i + n]
+                out = costs[y, p, begin:end]
+                grey = reference[y, begin:end]
+                fraction = fractions[p, begin:end]
+                for x in range(n):
+                    sample = left[x] + fraction[x] * (right[x] - left[x])
+                    difference = min(abs(sample - grey[x]), cap) * scale + np.float32(0.5)
+                    out[x] = np.uint16(np.uint32(out[x]) + np.uint32(np.int32(difference)))
+            if last > first:
+                limits[y, p, 0] = first
+                limits[y, p, 1] = last

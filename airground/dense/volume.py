@@ -1,0 +1,98 @@
+"""The volume of interest of one surface, as voxels (Sec. V and VIII-B).
+
+The voxels are those of a camera frustum: pixels of a reference view by planes evenly
+spaced in inverse depth. Against a gravity-aligned grid of the same 376 x 240 x 150 cells
+this wastes none outside the field of view, has its finest cells where depth is known best,
+and makes casting the surface into the reference view a scan along columns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.camera import PinholeCamera
+from airground.core.se3 import SE3
+from airground.core.surface import DepthMap
+
+ROBUST_PERCENT = 0.2
+"""Share of a depth map's nearest and farthest pixels that do not stretch the volume [%]."""
+
+
+@dataclass(frozen=True)
+class Volume:
+    """Voxels [row, plane, column] before a reference view.
+
+    Attributes:
+        camera: Whose pixels the voxels' columns are.
+        T_mav_camera: The reference view.
+        near_m, far_m: Depth of the first and the last plane.
+        planes: Number of planes.
+    """
+
+    camera: PinholeCamera
+    T_mav_camera: SE3
+    near_m: float
+    far_m: float
+    planes: int
+
+    @classmethod
+    def around(
+        cls,
+        depth_maps: list[DepthMap],
+        reference: DepthMap,
+        voxels: tuple[int, int, int],
+        margin_m: float,
+    ) -> Volume:
+        """The volume before `reference` that holds what all depth maps saw.
+
+        Args:
+            depth_maps: At least one of them with a finite depth.
+            reference: The depth map in whose view the surface will be cast.
+            voxels: Columns, rows and planes.
+            margin_m: Room before the nearest and behind the farthest depth [m].
+
+        Raises:
+            ValueError: No depth is finite.
+        """
+        depths = []
+        for depth_map in depth_maps:
+            T_reference_map = reference.T_mav_camera.inverse() @ depth_map.T_mav_camera
+            points = depth_map.camera.back_project(depth_map.depth)[::3, ::3].reshape(-1, 3)
+            z = (T_reference_map @ points[np.isfinite(points[:, 2])])[:, 2]
+            if len(z):
+                depths.append(np.percentile(z, [ROBUST_PERCENT, 100 - ROBUST_PERCENT]))
+        if not depths:
+            raise ValueError("no depth map has a finite depth")
+        near, far = np.min(depths, axis=0)[0], np.max(depths, axis=0)[1]
+        return cls(
+            resized(reference.camera, voxels[0], voxels[1]),
+            reference.T_mav_camera,
+            float(max(near - margin_m, 0.2 * near)),
+            float(far + margin_m),
+            voxels[2],
+        )
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Rows, planes, columns."""
+        return self.camera.height, self.planes, self.camera.width
+
+    def depths(self) -> NDArray[np.float64]:
+        """(planes,) depth of each plane [m]."""
+        return 1.0 / np.linspace(1.0 / self.near_m, 1.0 / self.far_m, self.planes)
+
+
+def resized(camera: PinholeCamera, width: int, height: int) -> PinholeCamera:
+    """The camera of the same field of view with other pixels."""
+    sx, sy = width / camera.width, height / camera.height
+    return PinholeCamera(
+        width,
+        height,
+        camera.fx * sx,
+        camera.fy * sy,
+        (camera.cx + 0.5) * sx - 0.5,
+        (camera.cy + 0.5) * sy - 0.5,
+    )
