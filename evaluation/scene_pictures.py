@@ -66,20 +66,25 @@ def robot_viewpoint(showcase: Showcase) -> Viewpoint:
     return Viewpoint(eye, target)
 
 
-def aerial_viewpoint(showcase: Showcase) -> Viewpoint:
-    """High above, from the side opposite to the ground robot."""
+def aerial_viewpoint(showcase: Showcase, aspect: float = 1.5) -> Viewpoint:
+    """High above, from the side opposite to the ground robot, with everything in view."""
     target = _centre(showcase.aerial_cloud)
-    points = showcase.aerial_cloud.points
-    size = float(np.linalg.norm(np.ptp(np.percentile(points[:, :2], [2, 98], axis=0), axis=0)))
     away = target[:2] - showcase.ground_path.translations[:, :2].mean(axis=0)
     length = float(np.linalg.norm(away))
     away = away / length if length > 0.3 else np.array([0.0, -1.0])
-    height = max(1.05 * size, 2.5)
-    return Viewpoint(np.append(target[:2] + 0.55 * height * away, target[2] + height), target)
+    view = Viewpoint(target + np.array([0.6 * away[0], 0.6 * away[1], 1.0]), target)
+    right, up, back = view.camera_pose()[:3, :3].T
+    shown = [showcase.mav_path.translations, showcase.ground_path.translations]
+    if len(showcase.aerial_cloud):
+        shown.append(np.percentile(showcase.aerial_cloud.points, [1, 99], axis=0))
+    points = np.concatenate(shown) - target
+    reach = np.maximum(np.abs(points @ up), np.abs(points @ right) / aspect)
+    distance = (points @ back + 1.06 * reach / np.tan(FIELD_OF_VIEW / 2)).max()
+    return Viewpoint(target + distance * back, target)
 
 
 def render_augmented_map(
-    showcase: Showcase, view: Viewpoint, size: tuple[int, int] = (1080, 720)
+    showcase: Showcase, view: Viewpoint, size: tuple[int, int] = (960, 640)
 ) -> NDArray[np.uint8]:
     """Draw both clouds, both paths and the cameras.
 
@@ -212,14 +217,16 @@ def _mesh(
     module: object, positions: NDArray, triangles: NDArray, colours: NDArray[np.uint8]
 ) -> pyrender.Mesh:
     """A mesh that shows its vertex colours as they are."""
-    opaque = np.concatenate([colours, np.full((len(colours), 1), 255, np.uint8)], axis=1)
+    # pyrender's shader ends with a gamma of 1/2.2; undo it.
+    linear = (colours.astype(np.float32) / 255) ** 2.2
+    opaque = np.concatenate([linear, np.ones((len(colours), 1), np.float32)], axis=1)
     material = module.MetallicRoughnessMaterial(  # type: ignore[attr-defined]
         doubleSided=True, metallicFactor=0.0, roughnessFactor=1.0
     )
     primitive = module.Primitive(  # type: ignore[attr-defined]
         positions=positions.astype(np.float32),
         indices=triangles.astype(np.uint32),
-        color_0=opaque.astype(np.float32) / 255,
+        color_0=opaque,
         material=material,
     )
     return module.Mesh(primitives=[primitive])  # type: ignore[attr-defined]

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from evaluation.figures.boxes import draw_box, log_axis, positions
 from evaluation.figures.style import PAPER, SERIES, styled
-from evaluation.statistics import quantile
+from evaluation.statistics import quantile, with_failures
 
 
 @dataclass(frozen=True)
@@ -37,23 +39,29 @@ def before_after_figure(
     axes = figure.subplots()
     log_axis(axes, [e for pair in trials.values() for e in (pair.before, pair.after)], floor)
     low, high = axes.get_ylim()
-    axes.set_ylim(min(low, paper / 2), max(high, paper * 2))
+    axes.set_ylim(min(low / 1.4, paper / 2), max(high, paper * 2))
     for group, (label, pair) in enumerate(trials.items()):
         offset, width = positions(len(trials), group, 0.7)
         for x, values in ((0, pair.before), (1, pair.after)):
             draw_box(axes, x + offset, values, width, SERIES[group])
-            median = quantile(values, 0.5)
-            if axes.get_ylim()[0] < median < axes.get_ylim()[1]:
-                axes.annotate(
-                    f"{median:.2g}", (x + offset, median), xytext=(0, 2.5),
-                    textcoords="offset points", ha="center", va="bottom", fontsize=8,
-                    weight="bold",
-                )  # fmt: skip
+            _write_median(axes, x + offset, values)
         axes.plot([], [], color=SERIES[group], linewidth=6, alpha=0.6, label=label)
     axes.plot([0.55, 1.45], [paper, paper], color=PAPER, linewidth=1.6, linestyle=(0, (5, 3)))
-    axes.text(0.53, paper, f"paper {paper:g} {unit}", color=PAPER, ha="right", va="center")
+    axes.text(1.52, paper, f"paper\n{paper:g} {unit}", color=PAPER, ha="left", va="center")
     axes.set_xlim(-0.5, 1.5)
     axes.set_xticks([0, 1], ["before ICP", "after ICP"])
     axes.set_title(title, pad=16)
     figure.legend(loc="outside upper left", fontsize=8.5)
     return figure
+
+
+def _write_median(axes: Axes, x: float, values: ArrayLike) -> None:
+    """The median in figures, under the lowest value so that it hides nothing."""
+    finite = with_failures(values)
+    finite = finite[np.isfinite(finite)]
+    if len(finite):
+        lowest = max(float(finite.min()), axes.get_ylim()[0])
+        axes.annotate(
+            f"{quantile(values, 0.5):.2g}", (x, lowest), xytext=(0, -3), ha="center", va="top",
+            textcoords="offset points", fontsize=8.5, weight="bold",
+        )  # fmt: skip

@@ -16,7 +16,7 @@ from evaluation.showcase import Showcase
 @styled
 def height_maps_figure(showcase: Showcase) -> Figure:
     """Aerial map, ground map with the aerial footprint at the best u, cost map."""
-    figure = Figure(figsize=(11.5, 4.3), layout="constrained")
+    figure = Figure(figsize=(11.5, 3.7), layout="constrained")
     aerial_axes, ground_axes, cost_axes = figure.subplots(1, 3)
     aerial, ground = showcase.aerial_heights, showcase.ground_heights
     step = showcase.steps[0]
@@ -35,7 +35,7 @@ def height_maps_figure(showcase: Showcase) -> Figure:
             vmin=low,
             vmax=max(high, low + 0.05),
         )
-        figure.colorbar(shown, ax=axes, label="height [m]", shrink=0.75)
+        figure.colorbar(shown, ax=axes, label="height [m]", shrink=0.9)
         axes.set_title(title)
     best = step.cost_map.best()
     if best is not None:
@@ -46,7 +46,7 @@ def height_maps_figure(showcase: Showcase) -> Figure:
     shown = draw_costs(cost_axes, cost_map.costs, cost_map.origin, cost_map.cells_per_m)
     units = {"zmssd": "ZMSSD [m²]", "ncc": "1 − correlation"}
     label = units.get(cost_map.cost, cost_map.cost)
-    figure.colorbar(shown, ax=cost_axes, label=label, shrink=0.75, extend="max")
+    figure.colorbar(shown, ax=cost_axes, label=label, shrink=0.9, extend="max")
     cost_axes.set_title("c  cost of every position u")
     if best is not None:
         cost_axes.plot(

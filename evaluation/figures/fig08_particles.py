@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
+from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from evaluation.figures.maps import draw_costs, mark_truth
@@ -12,6 +14,10 @@ from evaluation.figures.style import styled
 from evaluation.showcase import LocalizationStep
 
 PARTICLES = "#35C46A"
+ZOOM_BELOW_M = 0.25
+"""Particles that spread over less are also drawn enlarged."""
+ZOOM_M = 0.3
+"""Half the side of the enlarged square."""
 
 
 @styled
@@ -20,26 +26,48 @@ def particles_figure(steps: tuple[LocalizationStep, ...]) -> Figure:
     figure = Figure(figsize=(3.85 * len(steps), 4.2), layout="constrained")
     panels = figure.subplots(1, len(steps), squeeze=False)[0]
     for number, (axes, step) in enumerate(zip(panels, steps, strict=True), 1):
-        made, belief = step.cost_map, step.belief
-        draw_costs(axes, made.costs, made.origin, made.cells_per_m)
-        axes.plot(
-            *belief.particles[:, :2].T,
-            ".",
-            color=PARTICLES,
-            markersize=4.5,
-            markeredgewidth=0,
-            alpha=0.85,
-            label=f"{len(belief.particles)} particles",
-        )
-        axes.add_patch(covariance_ellipse(belief.estimate[:2], belief.covariance))
-        mark_truth(axes, step.true_u)
-        error = float(np.linalg.norm(belief.estimate[:2] - step.true_u))
-        axes.set_title(f"aerial map {number}: off by {error:.2f} m, spread {belief.spread_m:.2f} m")
-        axes.title.set_fontsize(9.5)
+        _draw_step(axes, step, legend=True)
+        error = float(np.linalg.norm(step.belief.estimate[:2] - step.true_u))
+        axes.set_title(f"{number}  off by {error:.2f} m, spread {step.belief.spread_m:.2f} m")
         axes.set_xlabel("x [m]")
+        if step.belief.spread_m < ZOOM_BELOW_M:
+            _zoom(axes, step)
     panels[0].set_ylabel("y [m]")
-    panels[0].legend(loc="lower left", frameon=True, framealpha=0.9)
+    panels[0].legend(loc="upper left", frameon=True, framealpha=0.9)
     return figure
+
+
+def _draw_step(axes: Axes, step: LocalizationStep, legend: bool) -> None:
+    made, belief = step.cost_map, step.belief
+    draw_costs(axes, made.costs, made.origin, made.cells_per_m)
+    axes.plot(
+        *belief.particles[:, :2].T,
+        ".",
+        color=PARTICLES,
+        markersize=4.5,
+        markeredgewidth=0,
+        alpha=0.85,
+        label=f"{len(belief.particles)} particles" if legend else None,
+    )
+    axes.add_patch(covariance_ellipse(belief.estimate[:2], belief.covariance))
+    mark_truth(axes, step.true_u)
+
+
+def _zoom(axes: Axes, step: LocalizationStep) -> None:
+    """A square of 0.6 m around the truth, in the corner farthest from it."""
+    x, y = step.true_u
+    left, right, bottom, top = *axes.get_xlim(), *axes.get_ylim()
+    column = 0.62 if x < (left + right) / 2 else 0.02
+    row = 0.62 if y < (bottom + top) / 2 else 0.02
+    inset = axes.inset_axes((column, row, 0.36, 0.36))
+    _draw_step(inset, step, legend=False)
+    inset.set_xlim(x - ZOOM_M, x + ZOOM_M)
+    inset.set_ylim(y - ZOOM_M, y + ZOOM_M)
+    inset.set_xticks([])
+    inset.set_yticks([])
+    for spine in inset.spines.values():
+        spine.set_visible(True)
+    axes.indicate_inset_zoom(inset, edgecolor="black", alpha=0.7)
 
 
 def covariance_ellipse(mean: NDArray, covariance: NDArray, sigmas: float = 2.0) -> Ellipse:
@@ -47,6 +75,9 @@ def covariance_ellipse(mean: NDArray, covariance: NDArray, sigmas: float = 2.0) 
     variances, axes = np.linalg.eigh(covariance)
     width, height = 2 * sigmas * np.sqrt(np.maximum(variances, 1e-8))
     angle = np.degrees(np.arctan2(axes[1, 0], axes[0, 0]))
-    return Ellipse(
-        tuple(mean), width, height, angle=angle, fill=False, edgecolor="white", linewidth=1.8
+    ellipse = Ellipse(
+        tuple(mean), width, height, angle=angle, fill=False, edgecolor="white", linewidth=2.0
     )
+    ellipse.set_path_effects([withStroke(linewidth=3.2, foreground="#555555")])
+    ellipse.set_zorder(4)
+    return ellipse

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import Colormap
 from matplotlib.image import AxesImage
 from numpy.typing import ArrayLike, NDArray
 
@@ -13,7 +14,7 @@ from evaluation.figures.style import COST_COLOURS, colour_map
 
 
 def draw_grid(
-    axes: Axes, cells: NDArray, origin: NDArray, cells_per_m: float, cmap: str, **limits: Any
+    axes: Axes, cells: NDArray, origin: NDArray, cells_per_m: float, cmap: str | Colormap, **limits: Any
 ) -> AxesImage:
     """Draw (nx, ny) cells so that x runs right and y up, both in metres."""
     half = 0.5 / cells_per_m

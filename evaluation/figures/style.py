@@ -7,6 +7,7 @@ from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
+from matplotlib.colors import Colormap, LinearSegmentedColormap
 from matplotlib.figure import Figure
 
 SERIES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")
@@ -15,13 +16,14 @@ PAPER = "#D62246"
 """The paper's published values, everywhere."""
 INK = "#222222"
 FAINT = "#8A8F98"
-HOLE = "#E9EAEC"
+HOLE = "#EFF0F2"
 """Cells and pixels without a value."""
 
 HEIGHT_COLOURS = "viridis"
 DEPTH_COLOURS = "viridis_r"
 ERROR_COLOURS = "magma_r"
-COST_COLOURS = "gray"
+COST_COLOURS = LinearSegmentedColormap.from_list("cost", ["#000000", "#C4C8CE"])
+"""Ends in grey, so that white lines stay visible on it."""
 
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -56,9 +58,10 @@ styled = mpl.rc_context(STYLE)
 PICTURE_DPI = 160
 
 
-def colour_map(name: str) -> mpl.colors.Colormap:
+def colour_map(colours: str | Colormap) -> Colormap:
     """A colour map that shows NaN as `HOLE`."""
-    return mpl.colormaps[name].with_extremes(bad=HOLE)
+    named = mpl.colormaps[colours] if isinstance(colours, str) else colours
+    return named.with_extremes(bad=HOLE)
 
 
 def picture_axes(axes: Axes) -> None:

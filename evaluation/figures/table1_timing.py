@@ -41,7 +41,7 @@ def timing_figure(durations_ms: dict[str, NDArray[np.float64]]) -> Figure:
     axes.set_xlim(0.1, 2e4)
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.set_yticks(range(len(stages)), [stage.title for stage in stages])
-    axes.invert_yaxis()
+    axes.set_ylim(len(stages) - 0.4, -0.6)
     axes.set_xlabel("time [ms]")
     axes.grid(axis="x")
     axes.bar(0, 0, color=SERIES[0], alpha=0.75, label="here: median, whisker to 95 %")

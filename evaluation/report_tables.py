@@ -1,0 +1,217 @@
+"""The report's tables: text cells, made from the results and the published figures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+
+from evaluation import published
+from evaluation.results import Condition, ResultTable
+from evaluation.statistics import Rate, quantile, quantiles, rate_within, wilson
+from evaluation.summary import real_time_factor, within_5cm_2deg
+
+MISSING = "–"
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """Cells as text; the first column names the row.
+
+    Attributes:
+        header: One text per column.
+        rows: Tuples as long as the header.
+    """
+
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def metres(value: float) -> str:
+    """Millimetres below 10 cm, metres above; words where failures reach."""
+    if np.isnan(value):
+        return MISSING
+    if np.isinf(value):
+        return "failed"
+    return f"{1e3 * value:.1f} mm" if abs(value) < 0.1 else f"{value:.2f} m"
+
+
+def degrees(value: float) -> str:
+    if np.isnan(value):
+        return MISSING
+    return "failed" if np.isinf(value) else f"{value:.2f}°"
+
+
+def rate(made: Rate) -> str:
+    """ "97.6 % (40 of 41; 87 to 100)" with the Wilson interval in percent."""
+    if made.total == 0:
+        return MISSING
+    counts = f"{made.successes} of {made.total}; {100 * made.low:.0f} to {100 * made.high:.0f}"
+    return f"{100 * made.share:.1f} % ({counts})"
+
+
+def success_at(table: ResultTable, iteration: int, limit: float) -> Rate:
+    """How many sequences are within `limit` at an iteration; none where it was not reached."""
+    errors = table.sequences("error_m")
+    if len(errors) == 0 or iteration not in errors:
+        return wilson(0, 0)
+    return rate_within(errors[iteration], limit)
+
+
+def claims(table: ResultTable, wrong_beyond_m: float = 0.5) -> tuple[Rate, Rate]:
+    """At the last iteration: sequences that claim a position, and those claims that are wrong."""
+    errors, converged = table.sequences("error_m"), table.sequences("converged")
+    if len(errors) == 0:
+        return wilson(0, 0), wilson(0, 0)
+    last = errors.columns[-1]
+    claimed = converged[last].to_numpy(float) > 0
+    wrong = claimed & ~(errors[last].to_numpy(float) <= wrong_beyond_m)
+    return (
+        wilson(int(claimed.sum()), len(claimed)),
+        wilson(int(wrong.sum()), int(claimed.sum())),
+    )
+
+
+def comparison_table(table: ResultTable, conditions: Sequence[Condition]) -> TextTable:
+    """Every condition beside the paper: what the issue asks of a run, row by row."""
+    measured = [table.of(condition).without_controls() for condition in conditions]
+    header = ("", "paper (real robots)", *(condition.label() for condition in conditions))
+    rows = [
+        (name, paper, *(cell(part) for part in measured)) for name, paper, cell in _COMPARED_ROWS
+    ]
+    return TextTable(header, tuple(row for row in rows if set(row[2:]) != {MISSING}))
+
+
+def timing_table(table: ResultTable) -> TextTable:
+    """Table I with what was measured here (of one condition)."""
+    rows = []
+    for stage in published.TABLE_I:
+        values = table.values("timing", stage.metric)
+        if len(values) == 0 and stage.published_ms is None:
+            continue
+        paper = MISSING
+        if stage.published_ms is not None:
+            paper = f"{stage.published_ms:g} ({stage.processor})"
+        spread = quantiles(values)
+        cells = (_ms(spread.median), _ms(spread.p95)) if len(values) else ("not run", MISSING)
+        rows.append((f"{stage.group}: {stage.title}", paper, *cells, str(len(values))))
+    header = ("stage", "paper, average [ms]", "here, median [ms]", "here, 95 % [ms]", "n")
+    return TextTable(header, tuple(rows))
+
+
+def scene_table(table: ResultTable) -> TextTable:
+    """The headline numbers scene by scene (of one condition)."""
+    rows = []
+    for scene in table.scenes():
+        part = table.of_scenes([scene])
+        trials = part.trials()
+        good = wilson(*within_5cm_2deg(part))
+        after = trials.get("after_translation_m", pd.Series(dtype=float))
+        rows.append(
+            (
+                scene,
+                rate(success_at(part, 1, 0.5)),
+                rate(success_at(part, 4, 0.25)),
+                metres(quantile(after, 0.5)),
+                rate(good),
+                metres(quantile(part.values("surface", "error_median_m"), 0.5)),
+                _percent(quantile(part.values("surface", "completeness"), 0.5)),
+            )
+        )
+    header = (
+        "scene",
+        "within 0.5 m at 1",
+        "within 0.25 m after 4",
+        "refined, median",
+        "within 5 cm and 2°",
+        "surface, median",
+        "completeness",
+    )
+    return TextTable(header, tuple(rows))
+
+
+def _ms(value: float) -> str:
+    if not np.isfinite(value):
+        return MISSING
+    return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:.2f}"
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.0f} %" if np.isfinite(value) else MISSING
+
+
+def _count(number: int) -> str:
+    return str(number) if number else MISSING
+
+
+def _error_after(table: ResultTable, iteration: int) -> str:
+    errors = table.sequences("error_m")
+    if len(errors) == 0 or iteration not in errors:
+        return MISSING
+    return metres(quantile(errors[iteration], 0.5))
+
+
+def _trial_median(metric: str, text: Callable[[float], str]) -> Callable[[ResultTable], str]:
+    def cell(table: ResultTable) -> str:
+        trials = table.trials()
+        return text(quantile(trials[metric], 0.5)) if metric in trials else MISSING
+
+    return cell
+
+
+def _trial_quantile(metric: str, q: float, text: Callable[[float], str]) -> Callable[[ResultTable], str]:
+    def cell(table: ResultTable) -> str:
+        trials = table.trials()
+        return text(quantile(trials[metric], q)) if metric in trials else MISSING
+
+    return cell
+
+
+def _median_of(stage: str, metric: str, text: Callable[[float], str]) -> Callable[[ResultTable], str]:
+    return lambda table: text(quantile(table.values(stage, metric), 0.5))
+
+
+def _real_time(table: ResultTable) -> str:
+    factor = real_time_factor(table)
+    return MISSING if factor is None else f"{factor:.2f}"
+
+
+def _claimed(table: ResultTable) -> str:
+    return rate(claims(table)[0])
+
+
+def _wrongly_claimed(table: ResultTable) -> str:
+    made = claims(table)[1]
+    return rate(made) if made.total else MISSING
+
+
+_COMPARED_ROWS: tuple[tuple[str, str, Callable[[ResultTable], str]], ...] = (
+    ("sequences", "41", lambda t: _count(len(t.sequences("error_m")))),
+    ("within 0.5 m at iteration 1", "65 %", lambda t: rate(success_at(t, 1, 0.5))),
+    ("within 0.25 m after 4", "89 %", lambda t: rate(success_at(t, 4, 0.25))),
+    ("median error after 4", MISSING, lambda t: _error_after(t, 4)),
+    ("median error after 12", MISSING, lambda t: _error_after(t, 12)),
+    ("position claimed at the end", MISSING, _claimed),
+    ("of these wrong by over 0.5 m", MISSING, _wrongly_claimed),
+    ("refinement trials", "67", lambda t: _count(len(t.trials()))),
+    ("start, median translation", MISSING, _trial_median("before_translation_m", metres)),
+    ("start, median angle", MISSING, _trial_median("before_rotation_deg", degrees)),
+    ("refined, median translation", "76 mm", _trial_median("after_translation_m", metres)),
+    ("refined, 95 % translation", MISSING, _trial_quantile("after_translation_m", 0.95, metres)),
+    ("refined, median angle", "3.0°", _trial_median("after_rotation_deg", degrees)),
+    ("refined within 5 cm and 2°", MISSING, lambda t: rate(wilson(*within_5cm_2deg(t)))),
+    (
+        "bound: refined from the truth, translation",
+        MISSING,
+        _trial_median("from_truth_translation_m", metres),
+    ),
+    ("bound: refined from the truth, angle", MISSING, _trial_median("from_truth_rotation_deg", degrees)),
+    ("MAV poses, RMS", "12 mm", _median_of("trajectory", "mav_ate_se3_rmse_m", metres)),
+    ("ground poses, RMS", "38 mm", _median_of("trajectory", "ground_ate_se3_rmse_m", metres)),
+    ("fused surface, median error", MISSING, _median_of("surface", "error_median_m", metres)),
+    ("fused surface, 90 % error", MISSING, _median_of("surface", "error_p90_m", metres)),
+    ("fused surface, completeness", MISSING, _median_of("surface", "completeness", _percent)),
+    ("recorded s / processing s", MISSING, _real_time),
+)
