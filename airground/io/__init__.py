@@ -1,1 +1,1 @@
-"""Recordings, trajectories and clouds on disk."""
+"""Recordings, trajectories and clouds on disk. Nothing here ever opens `truth/`."""

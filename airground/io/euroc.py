@@ -1,0 +1,144 @@
+"""EuRoC/ASL tables: inertial and magnetic samples, and the list of a camera's images."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.messages import ImuSamples, MagneticSamples
+from airground.core.se3 import SE3
+from airground.errors import RecordingError
+from airground.io.calibration import CameraTable
+
+IMU_COLUMNS = (
+    "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
+    "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]"
+)
+MAGNETIC_COLUMNS = "#timestamp [ns],B_S_x [T],B_S_y [T],B_S_z [T]"
+CAMERA_COLUMNS = "#timestamp [ns],filename"
+
+
+def read_imu(path: Path) -> ImuSamples:
+    """Read gyro [rad/s] and accelerometer [m/s^2] samples.
+
+    Raises:
+        RecordingError: Names the file and the first stamp or line that is wrong.
+    """
+    stamps, values = _read_samples(path, 6)
+    return ImuSamples(stamps, values[:, :3], values[:, 3:])
+
+
+def write_imu(path: Path, samples: ImuSamples) -> None:
+    values = np.hstack([samples.gyro, samples.accelerometer])
+    _write_samples(path, IMU_COLUMNS, samples.stamps_ns, values)
+
+
+def read_magnetic(path: Path) -> MagneticSamples:
+    """Read magnetic field samples [T]; raises like `read_imu`."""
+    stamps, values = _read_samples(path, 3)
+    return MagneticSamples(stamps, values)
+
+
+def write_magnetic(path: Path, samples: MagneticSamples) -> None:
+    _write_samples(path, MAGNETIC_COLUMNS, samples.stamps_ns, samples.field)
+
+
+def read_image_list(path: Path) -> tuple[NDArray[np.int64], list[str]]:
+    """Stamps (N,) [ns] and file names of a camera's images.
+
+    Raises:
+        RecordingError: Names the file and the line or stamp that is wrong.
+    """
+    stamps, names = [], []
+    for number, line in enumerate(read_lines(path), start=1):
+        if not line or line.startswith("#"):
+            continue
+        try:
+            stamp, name = line.split(",")
+            stamps.append(int(stamp))
+        except ValueError:
+            raise RecordingError(
+                f"{path}:{number}: expected 'timestamp [ns],filename', got '{line[:60]}'"
+            ) from None
+        names.append(name.strip())
+    array = np.array(stamps, np.int64)
+    check_stamps(array, path)
+    return array, names
+
+
+def write_image_list(path: Path, stamps_ns: NDArray[np.int64], names: list[str]) -> None:
+    lines = [f"{stamp},{name}" for stamp, name in zip(stamps_ns, names, strict=True)]
+    path.write_text("\n".join([CAMERA_COLUMNS, *lines]) + "\n", encoding="utf-8")
+
+
+def camera_yaml(camera: CameraTable, T_body_camera: SE3) -> str:
+    """`sensor.yaml` of a camera for tools of the field; the body of EuRoC is the IMU here."""
+    return (
+        f"sensor_type: camera\ncomment: pinhole\n{_pose_yaml(T_body_camera)}"
+        f"rate_hz: {camera.rate_hz}\nresolution: [{camera.width}, {camera.height}]\n"
+        f"camera_model: pinhole\n"
+        f"intrinsics: [{camera.fx!r}, {camera.fy!r}, {camera.cx!r}, {camera.cy!r}]\n"
+        "distortion_model: radial-tangential\ndistortion_coefficients: [0.0, 0.0, 0.0, 0.0]\n"
+    )
+
+
+def sensor_yaml(kind: str, T_body_sensor: SE3, numbers: dict[str, float]) -> str:
+    """`sensor.yaml` of an IMU or a magnetometer."""
+    lines = "".join(f"{name}: {value!r}\n" for name, value in numbers.items())
+    return f"sensor_type: {kind}\ncomment: simulated\n{_pose_yaml(T_body_sensor)}{lines}"
+
+
+def _pose_yaml(pose: SE3) -> str:
+    numbers = ", ".join(repr(float(v)) for v in pose.matrix().ravel())
+    return f"T_BS:\n  cols: 4\n  rows: 4\n  data: [{numbers}]\n"
+
+
+def _read_samples(path: Path, columns: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """(N,) stamps and (N, columns) values, all finite, in strict order of time."""
+    read_lines(path)  # a missing file gets its own message
+    dtype = np.dtype([("stamp", np.int64), ("values", np.float64, (columns,))])
+    try:
+        table = np.loadtxt(path, dtype=dtype, delimiter=",", comments="#", ndmin=1)
+    except ValueError as error:
+        raise RecordingError(
+            f"{path}: expected 'timestamp [ns]' and {columns} numbers a line: {error}"
+        ) from None
+    stamps, values = table["stamp"], table["values"]
+    check_stamps(stamps, path)
+    bad = ~np.isfinite(values).all(axis=1)
+    if bad.any():
+        stamp = stamps[np.argmax(bad)]
+        raise RecordingError(f"{path}: the sample at stamp {stamp} is not finite")
+    return np.ascontiguousarray(stamps), np.ascontiguousarray(values)
+
+
+def _write_samples(path: Path, columns: str, stamps: NDArray, values: NDArray) -> None:
+    rows = zip(stamps.tolist(), values.tolist(), strict=True)
+    lines = [f"{stamp}," + ",".join(map(repr, row)) for stamp, row in rows]
+    path.write_text("\n".join([columns, *lines]) + "\n", encoding="utf-8")
+
+
+def read_lines(path: Path) -> list[str]:
+    """The lines of a text file; RecordingError where it cannot be read."""
+    try:
+        return path.read_text(encoding="utf-8").splitlines()
+    except FileNotFoundError:
+        raise RecordingError(f"{path}: this file is missing from the recording") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise RecordingError(f"{path}: cannot be read as text: {error}") from None
+
+
+def check_stamps(stamps: NDArray[np.int64], path: Path) -> None:
+    """RecordingError unless there is a stamp and all strictly increase."""
+    if len(stamps) == 0:
+        raise RecordingError(f"{path}: holds no entry")
+    steps = np.diff(stamps)
+    if (steps <= 0).any():
+        after = int(np.argmax(steps <= 0)) + 1
+        problem = "is there twice" if steps[after - 1] == 0 else f"follows {stamps[after - 1]}"
+        raise RecordingError(
+            f"{path}: stamp {stamps[after]} (entry {after + 1}) {problem}; "
+            "stamps must strictly increase"
+        )

@@ -1,0 +1,103 @@
+"""`recording.toml`: what a recording is, and what its reader is told of the sensors."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+import tomli_w
+from pydantic import Field, ValidationError
+
+from airground.errors import RecordingError
+from airground.io.calibration import CalibrationTable, Table
+
+SCHEMA = 1
+
+
+class FrameCounts(Table):
+    """How many images each camera took."""
+
+    mav: Annotated[int, Field(ge=1)]
+    ground: Annotated[int, Field(ge=1)]
+
+
+class Header(Table):
+    """The contents of `recording.toml`.
+
+    Attributes:
+        schema_version: Of the recording's layout (key `schema`).
+        scene, seed, flight: What was recorded.
+        sensors: Name of the sensor preset.
+        duration_s: Length of the recording [s].
+        frames: Numbers of images.
+        calibration: What the pipeline is told of the sensors.
+        digests: SHA-256 of every text file and image folder by relative path.
+    """
+
+    schema_version: Annotated[int, Field(alias="schema")] = SCHEMA
+    scene: str
+    seed: int
+    flight: int
+    sensors: str
+    duration_s: Annotated[float, Field(gt=0)]
+    frames: FrameCounts
+    calibration: CalibrationTable
+    digests: dict[str, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]]
+
+
+def read_header(path: Path) -> Header:
+    """Read and check `recording.toml`.
+
+    Raises:
+        RecordingError: The file is missing, of another schema, or a key is wrong.
+    """
+    tables = read_toml(path)
+    schema = tables.get("schema")
+    if schema != SCHEMA:
+        raise RecordingError(f"{path}: schema is {schema!r}, this version reads {SCHEMA}")
+    return parse_table(Header, tables, path)
+
+
+def write_header(path: Path, header: Header) -> None:
+    write_toml(path, header)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """Raises RecordingError where the file is missing or no TOML."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise RecordingError(f"{path}: no such file; is this a recording?") from None
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise RecordingError(f"{path}: cannot be read as TOML: {error}") from None
+
+
+def write_toml(path: Path, table: Table) -> None:
+    """Write a table; the same values give the same bytes."""
+    path.write_text(tomli_w.dumps(table.model_dump(by_alias=True, mode="json")), encoding="utf-8")
+
+
+AnyTable = TypeVar("AnyTable", bound=Table)
+
+
+def parse_table(kind: type[AnyTable], values: dict[str, Any], path: Path) -> AnyTable:
+    """`values` as a table; RecordingError names file, key, value and rule."""
+    try:
+        return kind.model_validate(values)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        key = ".".join(str(step) for step in first["loc"])
+        if first["type"] == "extra_forbidden":
+            raise RecordingError(f"{path}: unknown key '{key}'") from None
+        if first["type"] == "missing":
+            raise RecordingError(f"{path}: key '{key}' is missing") from None
+        message = first["msg"].removeprefix("Value error, ")
+        raise RecordingError(
+            f"{path}: key '{key}': {message}, got {_short(first['input'])}"
+        ) from None
+
+
+def _short(value: object, length: int = 60) -> str:
+    text = repr(value)
+    return text if len(text) <= length else text[: length - 3] + "..."

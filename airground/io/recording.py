@@ -1,0 +1,239 @@
+"""A recording on disk, checked when opened and read as a stream of messages."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.cloud import Source
+from airground.core.messages import (
+    GroundImage,
+    ImuSamples,
+    MagneticSamples,
+    MavImage,
+    RobotCalibration,
+    Stamped,
+)
+from airground.errors import RecordingError
+from airground.io import layout
+from airground.io.digests import path_digest
+from airground.io.euroc import read_image_list, read_imu, read_magnetic
+from airground.io.header import Header, read_header
+from airground.io.images import read_colour, read_depth, read_grey
+from airground.io.tum import read_associations
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """What both robots sensed, without the truth.
+
+    Inertial and magnetic samples are read when the recording is opened (about 15 kB a
+    second of recording); images one by one when they are asked for.
+
+    Attributes:
+        path: The recording's folder.
+        header: What `recording.toml` says.
+        mav, ground: The calibration that the pipeline is told.
+        mav_camera_stamps, ground_camera_stamps: (N,) int64 of the images [ns].
+        mav_imu, ground_imu: All inertial samples.
+        mav_magnetic, ground_magnetic: All magnetometer samples.
+        mav_files, ground_colour_files, ground_depth_files: The images, in order of time.
+    """
+
+    path: Path
+    header: Header
+    mav: RobotCalibration
+    ground: RobotCalibration
+    mav_camera_stamps: NDArray[np.int64]
+    ground_camera_stamps: NDArray[np.int64]
+    mav_imu: ImuSamples
+    ground_imu: ImuSamples
+    mav_magnetic: MagneticSamples
+    ground_magnetic: MagneticSamples
+    mav_files: tuple[Path, ...]
+    ground_colour_files: tuple[Path, ...]
+    ground_depth_files: tuple[Path, ...]
+
+    @classmethod
+    def open(cls, path: Path | str) -> Recording:
+        """Open a recording and check everything but the contents of its images.
+
+        Raises:
+            RecordingError: One line that names file, key or stamp and what would be right.
+        """
+        path = Path(path)
+        if not path.is_dir():
+            raise RecordingError(f"{path}: no such recording (a folder with {layout.HEADER})")
+        header = read_header(path / layout.HEADER)
+        mav_stamps, mav_names = read_image_list(path / layout.MAV_CAMERA_LIST)
+        associations = read_associations(path / layout.GROUND_ASSOCIATIONS)
+        ground_stamps, colour_names, depth_names = associations
+        _check_count(path / layout.MAV_CAMERA_LIST, len(mav_stamps), header.frames.mav)
+        _check_count(path / layout.GROUND_ASSOCIATIONS, len(ground_stamps), header.frames.ground)
+        ground_folder = path / "ground"
+        recording = cls(
+            path=path,
+            header=header,
+            mav=header.calibration.mav.calibration(),
+            ground=header.calibration.ground.calibration(),
+            mav_camera_stamps=_frozen(mav_stamps),
+            ground_camera_stamps=_frozen(ground_stamps),
+            mav_imu=read_imu(path / layout.MAV_IMU_DATA),
+            ground_imu=read_imu(path / layout.GROUND_IMU_DATA),
+            mav_magnetic=read_magnetic(path / layout.MAV_MAGNETOMETER_DATA),
+            ground_magnetic=read_magnetic(path / layout.GROUND_MAGNETOMETER_DATA),
+            mav_files=tuple(path / layout.MAV_IMAGES / name for name in mav_names),
+            ground_colour_files=tuple(ground_folder / name for name in colour_names),
+            ground_depth_files=tuple(ground_folder / name for name in depth_names),
+        )
+        recording._check_images()
+        return recording
+
+    @property
+    def scene(self) -> str:
+        return self.header.scene
+
+    @property
+    def seed(self) -> int:
+        return self.header.seed
+
+    @property
+    def flight(self) -> int:
+        return self.header.flight
+
+    @property
+    def sensors(self) -> str:
+        """Name of the sensor preset."""
+        return self.header.sensors
+
+    @property
+    def duration_s(self) -> float:
+        return self.header.duration_s
+
+    @property
+    def depth_units_per_m(self) -> float:
+        """PNG value of one metre of depth, as the pipeline is told."""
+        return self.header.calibration.ground.depth.units_per_m
+
+    def messages(self) -> Iterator[Stamped]:
+        """Every message of both robots in order of time.
+
+        Before each image come the inertial and magnetic samples since the previous image
+        of the same robot, one message each unless there are none.
+
+        Raises:
+            RecordingError: An image cannot be read or does not fit the calibration.
+        """
+        streams = (
+            _with_samples(
+                Source.GROUND, self.ground_images(), self.ground_imu, self.ground_magnetic
+            ),
+            _with_samples(Source.MAV, self.mav_images(), self.mav_imu, self.mav_magnetic),
+        )
+        for _, bundle in heapq.merge(*streams, key=lambda stamped_bundle: stamped_bundle[0]):
+            yield from bundle
+
+    def mav_images(self) -> Iterator[MavImage]:
+        for index in range(len(self.mav_camera_stamps)):
+            yield self._mav_image(index)
+
+    def ground_images(self) -> Iterator[GroundImage]:
+        for index in range(len(self.ground_camera_stamps)):
+            yield self._ground_image(index)
+
+    def mav_image_at(self, stamp_ns: int) -> MavImage:
+        """The MAV's image with this stamp; ValueError if there is none."""
+        return self._mav_image(_index_of(self.mav_camera_stamps, stamp_ns))
+
+    def ground_image_at(self, stamp_ns: int) -> GroundImage:
+        """The ground robot's image with this stamp; ValueError if there is none."""
+        return self._ground_image(_index_of(self.ground_camera_stamps, stamp_ns))
+
+    def verify(self) -> None:
+        """Compare every file with the digests in `recording.toml`.
+
+        Raises:
+            RecordingError: Names the first file or image folder that differs.
+        """
+        for name, digest in self.header.digests.items():
+            place = self.path / name
+            if not place.exists():
+                raise RecordingError(f"{place}: is missing from the recording")
+            if path_digest(place) != digest:
+                raise RecordingError(
+                    f"{place}: differs from what was recorded (its SHA-256 in {layout.HEADER})"
+                )
+
+    def _mav_image(self, index: int) -> MavImage:
+        camera = self.mav.camera
+        image = read_grey(self.mav_files[index], camera.width, camera.height)
+        return MavImage(int(self.mav_camera_stamps[index]), image)
+
+    def _ground_image(self, index: int) -> GroundImage:
+        size = self.ground.camera.width, self.ground.camera.height
+        return GroundImage(
+            int(self.ground_camera_stamps[index]),
+            read_colour(self.ground_colour_files[index], *size),
+            read_depth(self.ground_depth_files[index], *size, self.depth_units_per_m),
+        )
+
+    def _check_images(self) -> None:
+        """Every listed image exists, and the first of each camera fits its calibration."""
+        for files in (self.mav_files, self.ground_colour_files, self.ground_depth_files):
+            present = {file for folder in {f.parent for f in files} for file in _listing(folder)}
+            for file in files:
+                if file not in present:
+                    raise RecordingError(f"{file}: this image is listed but missing")
+        self._mav_image(0)
+        self._ground_image(0)
+
+
+def _with_samples(
+    robot: Source,
+    images: Iterator[MavImage] | Iterator[GroundImage],
+    imu: ImuSamples,
+    magnetic: MagneticSamples,
+) -> Iterator[tuple[int, list[Stamped]]]:
+    """Each image with the samples since the one before it; its stamp comes first."""
+    previous = np.iinfo(np.int64).min
+    for image in images:
+        bundle = []
+        inertial = imu.between(previous, image.stamp_ns)
+        if len(inertial.stamps_ns):
+            bundle.append(Stamped(robot, inertial))
+        low, high = np.searchsorted(magnetic.stamps_ns, [previous, image.stamp_ns], side="right")
+        if high > low:
+            field = MagneticSamples(magnetic.stamps_ns[low:high], magnetic.field[low:high])
+            bundle.append(Stamped(robot, field))
+        bundle.append(Stamped(robot, image))
+        yield image.stamp_ns, bundle
+        previous = image.stamp_ns
+
+
+def _listing(folder: Path) -> list[Path]:
+    try:
+        return list(folder.iterdir())
+    except OSError as error:
+        raise RecordingError(f"{folder}: cannot be listed: {error.strerror}") from None
+
+
+def _check_count(path: Path, listed: int, told: int) -> None:
+    if listed != told:
+        raise RecordingError(f"{path}: lists {listed} images, {layout.HEADER} says {told}")
+
+
+def _frozen(stamps: NDArray[np.int64]) -> NDArray[np.int64]:
+    stamps.flags.writeable = False
+    return stamps
+
+
+def _index_of(stamps: NDArray[np.int64], stamp_ns: int) -> int:
+    index = int(np.searchsorted(stamps, stamp_ns))
+    if index == len(stamps) or stamps[index] != stamp_ns:
+        raise ValueError(f"no image has the stamp {stamp_ns}")
+    return index

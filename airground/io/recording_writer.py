@@ -1,0 +1,111 @@
+"""Writes the text files of a recording; images are written by whoever makes them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.messages import ImuSamples, MagneticSamples
+from airground.core.se3 import SE3
+from airground.io import layout
+from airground.io.calibration import RobotTable
+from airground.io.digests import file_digest, folder_digest
+from airground.io.euroc import (
+    camera_yaml,
+    sensor_yaml,
+    write_image_list,
+    write_imu,
+    write_magnetic,
+)
+from airground.io.header import Header, write_header
+from airground.io.tum import format_stamp, write_accelerometer, write_image_lists
+
+
+def mav_image_name(stamp_ns: int) -> str:
+    return f"{stamp_ns}.png"
+
+
+def ground_image_name(stamp_ns: int) -> str:
+    return f"{format_stamp(stamp_ns)}.png"
+
+
+def make_folders(root: Path) -> None:
+    """Create every folder of an empty recording."""
+    folders = (layout.MAV_IMU, layout.MAV_MAGNETOMETER, layout.GROUND_IMU)
+    for folder in (*layout.IMAGE_FOLDERS, *folders, layout.GROUND_MAGNETOMETER):
+        (root / folder).mkdir(parents=True)
+
+
+def write_mav(
+    root: Path,
+    told: RobotTable,
+    stamps_ns: NDArray[np.int64],
+    imu: ImuSamples,
+    magnetic: MagneticSamples,
+) -> None:
+    """Write the MAV's samples, image list and `sensor.yaml` files (EuRoC)."""
+    names = [mav_image_name(int(stamp)) for stamp in stamps_ns]
+    write_image_list(root / layout.MAV_CAMERA_LIST, stamps_ns, names)
+    yaml = camera_yaml(told.camera, SE3.from_matrix(told.T_imu_camera))
+    (root / layout.MAV_CAMERA / "sensor.yaml").write_text(yaml, encoding="utf-8")
+    _write_samples(root, layout.MAV_IMU, layout.MAV_MAGNETOMETER, told, imu, magnetic)
+
+
+def write_ground(
+    root: Path,
+    told: RobotTable,
+    stamps_ns: NDArray[np.int64],
+    imu: ImuSamples,
+    magnetic: MagneticSamples,
+) -> None:
+    """Write the ground robot's samples and image lists (TUM RGB-D, samples also EuRoC)."""
+    names = [ground_image_name(int(stamp)) for stamp in stamps_ns]
+    write_image_lists(root / "ground", stamps_ns, names)
+    write_accelerometer(root / layout.GROUND_ACCELEROMETER, imu)
+    _write_samples(root, layout.GROUND_IMU, layout.GROUND_MAGNETOMETER, told, imu, magnetic)
+
+
+def finish(root: Path, header: Header, image_digests: Mapping[str, Mapping[str, str]]) -> None:
+    """Write `recording.toml`, the last file, with the digests of all others.
+
+    Args:
+        root: The recording's folder.
+        header: Everything but the digests.
+        image_digests: SHA-256 of every image by image folder and file name.
+    """
+    digests = {folder: folder_digest(files) for folder, files in image_digests.items()}
+    for path in sorted(root.rglob("*")):
+        relative = path.relative_to(root)
+        parent = str(relative.parent)
+        if path.is_file() and parent not in digests and relative.parts[0] != layout.TRUTH:
+            digests[relative.as_posix()] = file_digest(path)
+    complete = header.model_copy(update={"digests": dict(sorted(digests.items()))})
+    write_header(root / layout.HEADER, complete)
+
+
+def _write_samples(
+    root: Path,
+    imu_folder: str,
+    magnetometer_folder: str,
+    told: RobotTable,
+    imu: ImuSamples,
+    magnetic: MagneticSamples,
+) -> None:
+    """Both sensors sit at the IMU, which is the body of EuRoC's `T_BS`."""
+    write_imu(root / imu_folder / "data.csv", imu)
+    write_magnetic(root / magnetometer_folder / "data.csv", magnetic)
+    numbers = {
+        "rate_hz": told.imu.rate_hz,
+        "gyroscope_noise_density": told.imu.gyro_noise_density,
+        "gyroscope_random_walk": told.imu.gyro_bias_walk,
+        "accelerometer_noise_density": told.imu.accelerometer_noise_density,
+        "accelerometer_random_walk": told.imu.accelerometer_bias_walk,
+    }
+    yaml = sensor_yaml("imu", SE3.identity(), numbers)
+    (root / imu_folder / "sensor.yaml").write_text(yaml, encoding="utf-8")
+    numbers = {"rate_hz": told.magnetometer.rate_hz, "noise": told.magnetometer.noise_t}
+    yaml = sensor_yaml("magnetometer", SE3.identity(), numbers)
+    (root / magnetometer_folder / "sensor.yaml").write_text(yaml, encoding="utf-8")

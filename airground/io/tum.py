@@ -1,0 +1,132 @@
+"""TUM text files: trajectories, image lists, associations, accelerometer samples.
+
+Times are in seconds with nine decimals; they are read and written without rounding.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.messages import ImuSamples
+from airground.core.se3 import SE3
+from airground.core.trajectory import Trajectory
+from airground.errors import RecordingError
+from airground.io.euroc import check_stamps, read_lines
+
+SECOND_NS = 1_000_000_000
+
+
+def format_stamp(stamp_ns: int) -> str:
+    """`stamp_ns` >= 0 in seconds with nine decimals."""
+    return f"{stamp_ns // SECOND_NS}.{stamp_ns % SECOND_NS:09d}"
+
+
+def parse_stamp(text: str) -> int:
+    """Nanoseconds from seconds such as '12', '12.5' or '1305031102.175304'; exact.
+
+    Raises:
+        ValueError: The text is no plain decimal number with up to nine decimals.
+    """
+    whole, _, decimals = text.partition(".")
+    if not whole.isdecimal() or len(decimals) > 9 or (decimals and not decimals.isdecimal()):
+        raise ValueError(f"'{text}' is no time in seconds with at most nine decimals")
+    return int(whole) * SECOND_NS + int(decimals.ljust(9, "0"))
+
+
+def read_tum(path: Path) -> Trajectory:
+    """Read poses `timestamp tx ty tz qx qy qz qw`.
+
+    Raises:
+        RecordingError: A line is no pose, not finite or out of order: names file and line.
+    """
+    stamps: list[int] = []
+    poses: list[SE3] = []
+    for number, line in _entries(path):
+        fields = line.split()
+        if len(fields) != 8:
+            raise RecordingError(
+                f"{path}:{number}: expected 'timestamp tx ty tz qx qy qz qw', "
+                f"got {len(fields)} fields"
+            )
+        try:
+            stamp = parse_stamp(fields[0])
+            values = np.array([float(field) for field in fields[1:]])
+        except ValueError as error:
+            raise RecordingError(f"{path}:{number}: {error}") from None
+        if not np.isfinite(values).all():
+            raise RecordingError(f"{path}:{number}: the pose at {fields[0]} s is not finite")
+        if abs(np.linalg.norm(values[3:]) - 1) > 1e-2:
+            raise RecordingError(
+                f"{path}:{number}: the quaternion (qx qy qz qw) must have length 1"
+            )
+        if stamps and stamp <= stamps[-1]:
+            raise RecordingError(
+                f"{path}:{number}: time {fields[0]} s does not follow "
+                f"{format_stamp(stamps[-1])} s; times must strictly increase"
+            )
+        stamps.append(stamp)
+        poses.append(SE3.from_quaternion_xyzw(values[3:], values[:3]))
+    if not stamps:
+        raise RecordingError(f"{path}: holds no pose")
+    return Trajectory.from_poses(stamps, poses)
+
+
+def write_tum(path: Path, trajectory: Trajectory) -> None:
+    """Write poses as `timestamp tx ty tz qx qy qz qw`."""
+    rows = np.hstack([trajectory.translations, trajectory.quaternions_xyzw()]).tolist()
+    lines = [
+        f"{format_stamp(stamp)} " + " ".join(f"{value:.9f}" for value in row)
+        for stamp, row in zip(trajectory.stamps_ns.tolist(), rows, strict=True)
+    ]
+    text = "\n".join(["# timestamp tx ty tz qx qy qz qw", *lines])
+    path.write_text(text + "\n", encoding="utf-8")
+
+
+def read_associations(path: Path) -> tuple[NDArray[np.int64], list[str], list[str]]:
+    """Colour stamps (N,) [ns], colour files and depth files, relative to the list's folder.
+
+    Raises:
+        RecordingError: Names the file and the line or stamp that is wrong.
+    """
+    stamps, colour, depth = [], [], []
+    for number, line in _entries(path):
+        fields = line.split()
+        if len(fields) != 4:
+            raise RecordingError(
+                f"{path}:{number}: expected 'time colour-file time depth-file', got '{line[:60]}'"
+            )
+        try:
+            stamps.append(parse_stamp(fields[0]))
+        except ValueError as error:
+            raise RecordingError(f"{path}:{number}: {error}") from None
+        colour.append(fields[1])
+        depth.append(fields[3])
+    array = np.array(stamps, np.int64)
+    check_stamps(array, path)
+    return array, colour, depth
+
+
+def write_image_lists(folder: Path, stamps_ns: NDArray[np.int64], names: list[str]) -> None:
+    """Write `rgb.txt`, `depth.txt` and `associations.txt` for images of the same names."""
+    entries = list(zip([format_stamp(int(t)) for t in stamps_ns], names, strict=True))
+    for kind in ("rgb", "depth"):
+        lines = [f"# timestamp filename ({kind})", *(f"{t} {kind}/{n}" for t, n in entries)]
+        (folder / f"{kind}.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    lines = [f"{t} rgb/{n} {t} depth/{n}" for t, n in entries]
+    (folder / "associations.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def write_accelerometer(path: Path, samples: ImuSamples) -> None:
+    """Write `timestamp ax ay az` [m/s^2]."""
+    rows = zip(samples.stamps_ns.tolist(), samples.accelerometer.tolist(), strict=True)
+    lines = [f"{format_stamp(t)} {x:.6f} {y:.6f} {z:.6f}" for t, (x, y, z) in rows]
+    path.write_text("\n".join(["# timestamp ax ay az", *lines]) + "\n", encoding="utf-8")
+
+
+def _entries(path: Path) -> list[tuple[int, str]]:
+    """Lines that are neither empty nor comments, with their numbers from 1."""
+    numbered = enumerate((line.strip() for line in read_lines(path)), start=1)
+    return [(number, line) for number, line in numbered if line and not line.startswith("#")]
