@@ -129,6 +129,9 @@ def fly(plan: FlightPlan, step_s: float, field: MagneticField) -> RobotMotion:
         mujoco.mj_forward(model, data)
         states[index, :7], states[index, 7:] = data.qpos, data.qvel
         sensors[index] = data.sensordata
+        # Held over the step, the gust is the mean of both ends, as trapezoids take it.
+        following = plan.gust[min(index + 1, count - 1)]
+        data.xfrc_applied[mav, :3] = 0.5 * (plan.gust[index] + following)
         mujoco.mj_step(model, data, nstep=substeps)
     return RobotMotion.in_field(
         field,
