@@ -94,12 +94,15 @@ def parse(name: str, words: Sequence[str]) -> Verb:
 
 
 def _first_part(box: str) -> str:
-    """The text of tyro's framed message, up to its first rule."""
-    lines = []
-    for line in box.splitlines():
-        text = line.strip("│╭╮╰╯─ ")
-        if line.startswith("│ ─"):
+    """The text of tyro's framed message, between its title and its first rule.
+
+    The frame is drawn with lines, or with hyphens where the screen's encoding lacks them.
+    """
+    words = []
+    for line in box.splitlines()[1:]:
+        is_rule = not line.strip("│├┤╭╮╰╯─- ")
+        if is_rule and words:
             break
-        if line.startswith("│") and text:
-            lines.append(text)
-    return " ".join(lines).rstrip(".")
+        if not is_rule:
+            words += line.strip("│ ").split()
+    return " ".join(words).rstrip(".")

@@ -37,7 +37,7 @@ def run(command: Callable[[], int | None]) -> int:
 
     Anything else that escapes is a bug and keeps its traceback.
     """
-    signal.signal(signal.SIGTERM, _terminate)
+    before = signal.signal(signal.SIGTERM, _terminate)
     try:
         return command() or EXIT_OK
     except AirgroundError as error:
@@ -51,6 +51,8 @@ def run(command: Callable[[], int | None]) -> int:
     except KeyboardInterrupt as interrupt:
         print_error("terminated" if isinstance(interrupt, Terminated) else "interrupted")
         return EXIT_INTERRUPTED
+    finally:
+        signal.signal(signal.SIGTERM, before)
     return EXIT_ERROR
 
 

@@ -1,0 +1,188 @@
+"""The command line as a user meets it: help, wrong words, errors, exit codes."""
+
+from __future__ import annotations
+
+import errno
+import os
+import resource
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from airground.errors import InputError, RecordingError
+from evaluation import cli, console
+from evaluation.commands.words import Verb, in_range
+
+RUN_CLI = "from evaluation.cli import main; main()"
+
+
+def exit_code(*words: str) -> object:
+    with pytest.raises(SystemExit) as exit_:
+        cli.main(words)
+    return exit_.value.code
+
+
+def one_error_line(capsys: pytest.CaptureFixture[str]) -> str:
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1, lines
+    assert lines[0].startswith("airground: error: ")
+    return lines[0]
+
+
+def cpu_seconds(*words: str) -> float:
+    """Processor time of one call in a fresh process; the wall clock depends on the neighbours."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run([sys.executable, "-c", RUN_CLI, *words], capture_output=True, check=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def test_help_answers_within_half_a_second() -> None:
+    assert min(cpu_seconds("--help") for _ in range(3)) < 0.5
+
+
+@pytest.mark.parametrize("verb", cli.VERBS)
+def test_every_verb_explains_itself(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert exit_code(verb, "--help") == 0
+    said = capsys.readouterr().out
+    first_line = (cli.verb_class(verb).__doc__ or "").splitlines()[0]
+    assert first_line == cli.VERBS[verb]
+    assert first_line.split()[0] in said
+    assert "--verbose" in said
+
+
+@pytest.mark.parametrize("verb", cli.VERBS)
+def test_a_verb_is_parsed_without_heavy_imports(verb: str) -> None:
+    heavy = "{'numpy', 'mujoco', 'cv2', 'numba', 'open3d', 'pandas', 'matplotlib', 'pydantic'}"
+    script = (
+        "import sys; from evaluation import cli\n"
+        f"try: cli.parse({verb!r}, ['--help'])\n"
+        "except SystemExit: pass\n"
+        f"print(sorted({heavy} & set(sys.modules)), file=sys.stderr)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stderr.strip() == "[]"
+
+
+def test_overview_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
+    assert exit_code("--help") == 0
+    said = capsys.readouterr().out
+    assert all(verb in said for verb in cli.VERBS)
+    assert exit_code() == console.EXIT_ERROR
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert exit_code("--version") == 0
+    assert capsys.readouterr().out.startswith("airground 0.")
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["simulat"], "known: simulate, run, evaluate"),
+        (["simulate", "flat", "--out", "x", "--sensors", "good"], "'nominal'"),
+        (["simulate", "flat", "--out", "x", "--seed", "a"], "--seed"),
+        (["simulate", "flat", "--out", "x", "--sed", "1"], "--sed"),
+        (["simulate", "flat"], "--out"),
+        (["doctor", "--threads", "0"], "--threads 0: must be at least 1"),
+        (["reproduce", "--out", "x", "--poses", "slam"], "'oracle'"),
+    ],
+)
+def test_wrong_words_get_one_line(
+    words: list[str], named: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert exit_code(*words) == console.EXIT_ERROR
+    assert named in one_error_line(capsys)
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["no_such_scene"], "indoor_a"),
+        (["flat", "--seed", "-1"], "--seed -1: must be from 0"),
+        (["flat", "--duration-s", "nan"], "--duration-s nan: must be at least 1"),
+        (["flat", "--flight", "-2"], "--flight -2: must be at least 0"),
+    ],
+)
+def test_simulate_refuses_what_it_cannot_record(
+    words: list[str], named: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "recording"
+    assert exit_code("simulate", *words, "--out", str(out)) == console.EXIT_ERROR
+    assert named in one_error_line(capsys)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_existing_folder_is_left_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine").write_text("precious")
+    for verb in (["simulate", "flat"], ["reproduce"]):
+        assert exit_code(*verb, "--out", str(tmp_path)) == console.EXIT_ERROR
+        assert "exists already" in one_error_line(capsys)
+    assert (tmp_path / "mine").read_text() == "precious"
+
+
+class TestRun:
+    """What becomes of a verb's errors."""
+
+    def test_a_users_error_is_one_line(self, capsys: pytest.CaptureFixture[str]) -> None:
+        def fail() -> None:
+            raise RecordingError("flight1: mav0/cam0/data.csv line 7:\n  stamp 5 repeats")
+
+        assert console.run(fail) == console.EXIT_ERROR
+        assert one_error_line(capsys).endswith("line 7: stamp 5 repeats")
+
+    def test_a_full_disk_names_the_file(self, capsys: pytest.CaptureFixture[str]) -> None:
+        def fail() -> None:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "results/a.png")
+
+        assert console.run(fail) == console.EXIT_ERROR
+        assert one_error_line(capsys) == (
+            "airground: error: results/a.png: no space left on the disk"
+        )
+
+    @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+    def test_interrupts_unwind(self, sent: int, capsys: pytest.CaptureFixture[str]) -> None:
+        cleaned = []
+
+        def be_interrupted() -> None:
+            try:
+                signal.raise_signal(sent)
+            finally:
+                cleaned.append(True)
+
+        before = signal.getsignal(signal.SIGTERM)
+        assert console.run(be_interrupted) == console.EXIT_INTERRUPTED
+        assert signal.getsignal(signal.SIGTERM) == before
+        assert cleaned
+        assert "interrupted" in one_error_line(capsys) or sent == signal.SIGTERM
+
+    def test_a_bug_keeps_its_traceback(self) -> None:
+        def fail() -> None:
+            raise ZeroDivisionError
+
+        with pytest.raises(ZeroDivisionError):
+            console.run(fail)
+
+    def test_the_verbs_exit_code_is_kept(self) -> None:
+        assert console.run(lambda: 1) == 1
+        assert console.run(lambda: None) == console.EXIT_OK
+
+
+def test_in_range_refuses_what_is_no_number() -> None:
+    assert in_range("--x", 2.0, low=1.0, high=2.0) == 2.0
+    with pytest.raises(InputError, match="--x 3: must be from 1 to 2"):
+        in_range("--x", 3.0, low=1.0, high=2.0)
+    with pytest.raises(InputError, match="--x nan"):
+        in_range("--x", float("nan"))
+
+
+def test_a_verb_must_say_what_it_does() -> None:
+    with pytest.raises(NotImplementedError):
+        Verb().main()
