@@ -7,21 +7,23 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from airground.io.recording import Recording
-from sim.truth import Truth
 
+from airground.io.recording import Recording
 from evaluation.mapping_pass import Maps, map_recording
 from evaluation.results import Row
+from evaluation.row_writer import RowWriter
 from evaluation.setups import Setup
+from evaluation.showcase import Showcase
+from evaluation.showcase_maker import make_showcase
 from evaluation.surface_error import surface_error
 from evaluation.timing import STAGE_OF
 from evaluation.trials import (
     SEQUENCE_LENGTH,
-    Iteration,
     localize_sequence,
     refine_sighting,
     sequence_starts,
 )
+from sim.truth import Truth
 
 
 @dataclass(frozen=True)
@@ -39,79 +41,66 @@ class Protocol:
 
 @dataclass(frozen=True)
 class Task:
-    """One recording and the setups that share their maps: the unit of parallel work."""
+    """One recording and the setups that share their maps: the unit of parallel work.
+
+    Attributes:
+        recording: Where it is.
+        seed, flight: What it was made from; they seed the trials too.
+        setups: What to measure; all make the same maps.
+        protocol: How much of it.
+        showcase: Whether to gather what pictures need, of the first setup.
+    """
 
     recording: Path
-    setups: list[Setup]
     seed: int
     flight: int
+    setups: list[Setup]
     protocol: Protocol
+    showcase: bool = False
 
 
-class Rows:
-    """Writes rows of one recording under one condition."""
+@dataclass(frozen=True)
+class Outcome:
+    """What a task found."""
 
-    def __init__(self, recording: Recording, task: Task, setup: Setup) -> None:
-        self.rows: list[Row] = []
-        self._scene, self._seed, self._flight = recording.scene, task.seed, task.flight
-        self._condition = setup.condition(recording.sensors)
-
-    def add(
-        self,
-        stage: str,
-        metric: str,
-        value: float,
-        unit: str,
-        sequence: int | None = None,
-        iteration: int | None = None,
-        trial: int | None = None,
-        note: str = "",
-    ) -> None:
-        self.rows.append(
-            Row(
-                self._scene,
-                self._seed,
-                self._flight,
-                self._condition,
-                stage,
-                metric,
-                float(value),
-                unit,
-                sequence,
-                iteration,
-                trial,
-                note,
-            )
-        )
+    rows: list[Row]
+    showcase: Showcase | None
 
 
-def run_task(task: Task) -> list[Row]:
+def run_task(task: Task) -> Outcome:
     """Measure everything that a task asks for."""
     recording = Recording.open(task.recording)
     truth = Truth.open(task.recording)
     maps = map_recording(recording, truth, task.setups[0], task.seed)
     rows: list[Row] = []
     for setup in task.setups:
-        out = Rows(recording, task, setup)
+        out = RowWriter(recording.scene, task.seed, task.flight, setup.condition(recording.sensors))
         _add_run(out, recording, maps)
         _add_surfaces(out, maps, truth)
         _add_sequences(out, maps, truth, setup, task)
         _add_trials(out, maps, truth, setup, task)
         rows += out.rows
-    return rows
+    showcase = None
+    if task.showcase:
+        showcase = make_showcase(recording, truth, maps, task.setups[0], task.seed)
+    return Outcome(rows, showcase)
 
 
-def _add_run(out: Rows, recording: Recording, maps: Maps) -> None:
+def peak_memory_mib() -> float:
+    """The most memory that this process ever held [MiB]."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def _add_run(out: RowWriter, recording: Recording, maps: Maps) -> None:
     out.add("run", "recorded_s", recording.duration_s, "s")
     out.add("run", "processing_s", maps.processing_s, "s")
-    peak_mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    out.add("run", "peak_memory_mib", peak_mib, "MiB")
+    out.add("run", "peak_memory_mib", peak_memory_mib(), "MiB")
     for stage, durations in maps.durations_ms.items():
         for duration in durations:
             out.add("timing", stage, duration, "ms")
 
 
-def _add_surfaces(out: Rows, maps: Maps, truth: Truth) -> None:
+def _add_surfaces(out: RowWriter, maps: Maps, truth: Truth) -> None:
     for index, sighting in enumerate(maps.sightings):
         surface = sighting.surface
         T_world_camera = truth.T_world_mav_camera(surface.reference_stamp_ns)
@@ -121,7 +110,7 @@ def _add_surfaces(out: Rows, maps: Maps, truth: Truth) -> None:
         out.add("surface", "completeness", error.completeness, "", trial=index)
 
 
-def _add_sequences(out: Rows, maps: Maps, truth: Truth, setup: Setup, task: Task) -> None:
+def _add_sequences(out: RowWriter, maps: Maps, truth: Truth, setup: Setup, task: Task) -> None:
     starts = sequence_starts(len(maps.sightings), task.protocol.sequences)
     for sequence, start in enumerate(starts):
         rng = np.random.default_rng([task.seed, task.flight, 1, sequence])
@@ -131,38 +120,15 @@ def _add_sequences(out: Rows, maps: Maps, truth: Truth, setup: Setup, task: Task
             out.add("timing", STAGE_OF[type(event)], duration_ms, "ms")
             if result is not None:
                 iteration += 1
-                _add_iteration(out, result, sequence, iteration)
+                out.add_belief(result.belief, result.error, sequence, iteration)
         for missing in range(iteration + 1, SEQUENCE_LENGTH + 1):
-            note = "the flight gave no further aerial map"
-            out.add("localization", "error_m", np.nan, "m", sequence, missing, note=note)
-            out.add("localization", "converged", 0, "", sequence, missing, note=note)
+            out.add_no_belief("the flight gave no further aerial map", sequence, missing)
 
 
-def _add_iteration(out: Rows, result: Iteration, sequence: int, iteration: int) -> None:
-    belief = result.belief
-    for metric, value, unit, note in (
-        ("error_m", result.error_m, "m", ""),
-        ("spread_m", belief.spread_m, "m", ""),
-        ("converged", belief.converged, "", belief.refusal),
-    ):
-        out.add("localization", metric, value, unit, sequence, iteration, note=note)
-
-
-def _add_trials(out: Rows, maps: Maps, truth: Truth, setup: Setup, task: Task) -> None:
+def _add_trials(out: RowWriter, maps: Maps, truth: Truth, setup: Setup, task: Task) -> None:
     count = min(task.protocol.trials, len(maps.sightings))
     chosen = np.linspace(0, len(maps.sightings) - 1, count).round().astype(int)
     for trial, index in enumerate(chosen):
         rng = np.random.default_rng([task.seed, task.flight, 2, trial])
         result = refine_sighting(maps.sightings[index], truth, setup.config, rng)
-        for name, error in (
-            ("before", result.before),
-            ("after", result.after),
-            ("from_truth", result.from_truth),
-        ):
-            out.add("refinement", f"{name}_translation_m", error.translation_m, "m", trial=trial)
-            out.add("refinement", f"{name}_rotation_deg", error.rotation_deg, "deg", trial=trial)
-        alignment = result.alignment
-        out.add(
-            "refinement", "accepted", alignment.accepted, "", trial=trial, note=alignment.refusal
-        )
-        out.add("timing", "icp", result.duration_ms, "ms", trial=trial)
+        out.add_alignment(result.alignment, result.errors, result.duration_ms, trial)

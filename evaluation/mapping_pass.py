@@ -8,8 +8,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from airground.io.recording import Recording
-from sim.truth import Truth
 
 from airground.core.events import (
     DepthMapMade,
@@ -21,10 +19,12 @@ from airground.core.events import (
 )
 from airground.core.se3 import SE3
 from airground.core.surface import DepthMap
+from airground.io.recording import Recording
 from airground.pipeline import Mapping, Sighting, sight
 from evaluation.oracle import oracle_front_ends
 from evaluation.setups import Setup
 from evaluation.timing import STAGE_OF, timed
+from sim.truth import Truth
 
 
 @dataclass

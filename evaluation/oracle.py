@@ -57,6 +57,8 @@ class PoseNoise:
         return "oracle poses, " + (" and ".join(parts) or "exact")
 
 
+EXACT = PoseNoise()
+
 PAPER_DRIFT = PoseNoise(drift_mav_m=0.012, drift_ground_m=0.038)
 """What the paper measured for its SLAM (Fig. 9, 10)."""
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from sim.truth import Truth
 
 from airground.core.se3 import SE3
 from airground.pipeline import Sighting
+from sim.truth import Truth
 
 
 @dataclass(frozen=True)

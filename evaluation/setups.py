@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from airground.config import Config, paper
-from evaluation.oracle import PAPER_DRIFT, PoseNoise
+from evaluation.oracle import EXACT, PAPER_DRIFT, PoseNoise
 from evaluation.results import Condition
 
 
@@ -20,14 +20,14 @@ class Setup:
     """
 
     config: Config
-    noise: PoseNoise = PoseNoise()
+    noise: PoseNoise = EXACT
     variant: str = ""
 
     def condition(self, sensors: str) -> Condition:
         """How results name this setup."""
         return Condition(
             preset=self.config.preset,
-            poses="oracle exact" if self.noise == PoseNoise() else "oracle with drift",
+            poses="oracle exact" if self.noise == EXACT else "oracle with drift",
             sensors=sensors,
             heading=self.config.localization.heading,
             variant=self.variant,

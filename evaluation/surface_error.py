@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from sim.truth import Truth
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
+from sim.truth import Truth
 
 
 @dataclass(frozen=True)

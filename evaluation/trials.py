@@ -7,8 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from airground.refinement import refine
-from sim.truth import Truth
 
 from airground.config import Config
 from airground.core.belief import Alignment, Belief
@@ -16,8 +14,10 @@ from airground.core.events import BeliefUpdated, Event
 from airground.core.se3 import SE3
 from airground.localization.particle_filter import MonteCarloLocalizer
 from airground.pipeline import Sighting, locate
+from airground.refinement import refine
 from evaluation.relation import PoseError, pose_error, true_T_ground_mav
 from evaluation.timing import timed
+from sim.truth import Truth
 
 SEQUENCE_LENGTH = 12
 """Aerial maps in a sequence (Sec. VIII-C)."""
@@ -28,10 +28,10 @@ START_NOISE_M, START_NOISE_DEG = 0.2, 3.0
 
 @dataclass(frozen=True)
 class Iteration:
-    """One aerial map taken in by one sequence; error is NaN where nothing was estimated."""
+    """One aerial map taken in by one sequence."""
 
     belief: Belief
-    error_m: float
+    error: PoseError
 
 
 @dataclass(frozen=True)
@@ -39,17 +39,14 @@ class RefinementTrial:
     """One alignment from a noisy start.
 
     Attributes:
-        before, after: Errors of the start and of the result.
-        from_truth: Error of the result when started at the truth: the bound that drift and
-            map errors set.
         alignment: What refinement said.
+        errors: "before" of the start, "after" of the result, and "from_truth" of the result
+            when started at the truth: the bound that drift and the maps' errors set.
         duration_ms: How long it took, preparation included.
     """
 
-    before: PoseError
-    after: PoseError
-    from_truth: PoseError
     alignment: Alignment
+    errors: dict[str, PoseError]
     duration_ms: float
 
 
@@ -75,7 +72,7 @@ def localize_sequence(
             iteration = None
             if isinstance(event, BeliefUpdated):
                 error = pose_error(event.belief.T_ground_mav, sighting, truth)
-                iteration = Iteration(event.belief, error.horizontal_m)
+                iteration = Iteration(event.belief, error)
             yield event, duration_ms, iteration
 
 
@@ -99,14 +96,13 @@ def refine_sighting(
     started = time.perf_counter()
     alignment = _refined(sighting, start, config)
     duration_ms = (time.perf_counter() - started) * 1e3
-    bound = _refined(sighting, true, config)
-    return RefinementTrial(
-        before=pose_error(start, sighting, truth),
-        after=pose_error(alignment.T_ground_mav, sighting, truth),
-        from_truth=pose_error(bound.T_ground_mav, sighting, truth),
-        alignment=alignment,
-        duration_ms=duration_ms,
-    )
+    poses = {
+        "before": start,
+        "after": alignment.T_ground_mav,
+        "from_truth": _refined(sighting, true, config).T_ground_mav,
+    }
+    errors = {when: pose_error(pose, sighting, truth) for when, pose in poses.items()}
+    return RefinementTrial(alignment, errors, duration_ms)
 
 
 def _refined(sighting: Sighting, start: SE3, config: Config) -> Alignment:

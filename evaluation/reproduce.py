@@ -1,0 +1,99 @@
+"""The paper's protocol: scenes x flights, recorded, mapped, localized, refined."""
+
+from __future__ import annotations
+
+import logging
+import multiprocessing
+import os
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.progress import track
+
+from evaluation.environment import prepare
+from evaluation.experiment import Protocol, Task, run_task
+from evaluation.results import ResultTable, Row
+from evaluation.setups import Setup, grouped_by_maps
+from evaluation.showcase import Showcase
+from sim.presets import SensorPreset
+from sim.recorder import record
+from sim.scene import Scene
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to reproduce.
+
+    Attributes:
+        scenes: Which worlds.
+        flights: How many flights over each.
+        setups: What to measure, the primary setup first.
+        sensors: How good the sensors are.
+        protocol: How much is measured on each recording.
+        seed: Draws the heaps, the flights, the noise and the particles.
+    """
+
+    scenes: list[Scene]
+    flights: int
+    setups: list[Setup]
+    sensors: SensorPreset
+    protocol: Protocol
+    seed: int
+
+
+@dataclass(frozen=True)
+class Findings:
+    """Everything that was measured, and what pictures are drawn from."""
+
+    table: ResultTable
+    showcase: Showcase | None
+
+
+def reproduce(plan: Plan, recordings: Path, workers: int | None = None) -> Findings:
+    """Record what is not there yet, and measure all of it.
+
+    Args:
+        plan: What to do.
+        recordings: Folder of the recordings; those in it with the right name are used.
+        workers: Processes at a time; None for one a core. The result does not depend on it.
+    """
+    tasks = []
+    for scene in plan.scenes:
+        for flight in range(plan.flights):
+            path = _recorded(plan, scene, flight, recordings, workers)
+            for setups in grouped_by_maps(plan.setups):
+                first = not tasks
+                tasks.append(Task(path, plan.seed, flight, setups, plan.protocol, first))
+    return _measured(tasks, workers or os.cpu_count() or 1)
+
+
+def _recorded(plan: Plan, scene: Scene, flight: int, folder: Path, workers: int | None) -> Path:
+    """The recording of one flight, made if it is not there yet."""
+    path = folder / f"{scene.name}_{plan.sensors.name}_seed{plan.seed}_flight{flight}"
+    if path.exists():
+        log.info("using the recording %s", path)
+    else:
+        folder.mkdir(parents=True, exist_ok=True)
+        record(scene, plan.seed, plan.sensors, path, workers=workers, flight=flight)
+    return path
+
+
+def _measured(tasks: list[Task], workers: int) -> Findings:
+    """The tasks' outcomes, in the order of the tasks whatever the order of finishing."""
+    processes = min(len(tasks), workers)
+    rows: list[Row] = []
+    showcase: Showcase | None = None
+    with ProcessPoolExecutor(
+        processes,
+        multiprocessing.get_context("spawn"),
+        initializer=prepare,
+        initargs=(max(1, workers // processes),),
+    ) as pool:
+        outcomes = pool.map(run_task, tasks)
+        for outcome in track(outcomes, "measuring", total=len(tasks)):
+            rows += outcome.rows
+            showcase = showcase or outcome.showcase
+    return Findings(ResultTable.from_rows(rows), showcase)
