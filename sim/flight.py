@@ -30,6 +30,7 @@ from sim.scene import MavPath
 
 RISE_S = 3.0
 SPIN_UP_S = 0.7
+ROUNDING_S = 0.6  # keeps the tilt below 10 degrees in a right-angled corner at 0.5 m/s
 SETTLE_S = 1.0  # before the log begins, for the feet to settle
 WAYPOINT_NOISE_M = 0.05
 HEADING_NOISE_RAD = np.deg2rad(4.0)
@@ -83,7 +84,7 @@ def plan_flight(
     waypoints = np.array([mav.start, *mav.waypoints], np.float64).reshape(-1, 2)
     noise = np.clip(rng.standard_normal((len(waypoints) - 1, 2)), -2, 2)
     waypoints[1:] += WAYPOINT_NOISE_M * noise
-    path = planar_path(waypoints, mav.speed_mps, risen_s - 1.0)
+    path = planar_path(waypoints, mav.speed_mps, risen_s - 1.0, ROUNDING_S)
     aloft = minimum_jerk(times, mav.takeoff_s + 0.5 * RISE_S, RISE_S)
     sway = sinusoids(
         times, mav.sway_m * SWAY_SHARE, rng.uniform(*SWAY_HZ, 3), rng.uniform(0, 2 * np.pi, 3)
