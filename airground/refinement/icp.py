@@ -1,0 +1,105 @@
+"""Point-to-plane ICP with trimming and a falling correspondence distance (Sec. VII)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from airground.config import Refinement
+from airground.core.se3 import SE3
+from airground.refinement.surfels import Surfels
+
+SETTLED_M = 1e-4
+MIN_CORRESPONDENCES = 50
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Where ICP ended.
+
+    Attributes:
+        T_target_source: The motion found.
+        settled: Whether the last step was small.
+        correspondences: How many the last step used.
+    """
+
+    T_target_source: SE3
+    settled: bool
+    correspondences: int
+
+
+def point_to_plane_icp(source: NDArray, target: Surfels, start: SE3, config: Refinement) -> Fit:
+    """Move a cloud until the distances along the target's normals are least.
+
+    Args:
+        source: (N, 3) points to move [m].
+        target: What to move them onto.
+        start: First guess of T_target_source.
+        config: Distances, share kept, and number of steps.
+    """
+    motion = start
+    distance = config.max_distance_m
+    # The distance falls by a constant factor over two thirds of the steps, then stays.
+    falling = max(1, (2 * config.iterations) // 3)
+    factor = (config.final_distance_m / config.max_distance_m) ** (1.0 / falling)
+    used = 0
+    for _ in range(config.iterations):
+        moved = motion @ source
+        index, squared = target.nearest(moved)
+        keep = _closest(squared, distance, config.trim)
+        used = int(keep.sum())
+        if used < MIN_CORRESPONDENCES:
+            return Fit(motion, False, used)
+        step = _solve(moved[keep], target.points[index[keep]], target.normals[index[keep]])
+        motion = step @ motion
+        at_final = distance <= config.final_distance_m * 1.001
+        if at_final and np.abs(step @ moved[keep] - moved[keep]).max() < SETTLED_M:
+            return Fit(motion, True, used)
+        distance = max(distance * factor, config.final_distance_m)
+    return Fit(motion, False, used)
+
+
+def _closest(squared: NDArray, distance: float, share: float) -> NDArray[np.bool_]:
+    """Correspondences within the distance, and of these the closest share."""
+    near = squared < distance * distance
+    if near.any() and share < 1:
+        near &= squared <= np.quantile(squared[near], share)
+    return near
+
+
+def _solve(moved: NDArray, points: NDArray, normals: NDArray) -> SE3:
+    """The small motion that least squares of the point-to-plane distances asks for."""
+    # Turning about the middle of the points keeps the normal equations well conditioned.
+    centre = moved.mean(axis=0)
+    matrix, vector = _normal_equations(moved - centre, points - centre, normals)
+    # A little damping holds directions still that no plane constrains.
+    matrix += 1e-6 * np.trace(matrix) * np.eye(6)
+    delta = np.linalg.solve(matrix, vector)
+    turn = SE3.from_rotation_vector(delta[:3])
+    return SE3(turn.rotation, centre + delta[3:] - turn.rotation @ centre)
+
+
+@njit(cache=True, error_model="numpy")
+def _normal_equations(moved: NDArray, points: NDArray, normals: NDArray) -> tuple[NDArray, NDArray]:
+    """Sums over J^T J (6, 6) and -J^T r (6,) with J = [p x n, n] and r = n . (p - q)."""
+    matrix = np.zeros((6, 6))
+    vector = np.zeros(6)
+    row = np.empty(6)
+    for i in range(len(moved)):
+        p, q, n = moved[i], points[i], normals[i]
+        row[0] = p[1] * n[2] - p[2] * n[1]
+        row[1] = p[2] * n[0] - p[0] * n[2]
+        row[2] = p[0] * n[1] - p[1] * n[0]
+        row[3], row[4], row[5] = n[0], n[1], n[2]
+        residual = n[0] * (p[0] - q[0]) + n[1] * (p[1] - q[1]) + n[2] * (p[2] - q[2])
+        for j in range(6):
+            vector[j] -= row[j] * residual
+            for k in range(j, 6):
+                matrix[j, k] += row[j] * row[k]
+    for j in range(6):
+        for k in range(j):
+            matrix[j, k] = matrix[k, j]
+    return matrix, vector

@@ -1,0 +1,118 @@
+"""A start for ICP from rough guesses: height maps laid over each other nearby (Eq. 2)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from airground.config import Refinement
+from airground.core.belief import HeightMap
+from airground.core.height_map import lattice_index, make_height_map
+from airground.core.se3 import SE3
+
+COARSE = 2
+HEADINGS_DEG = np.arange(-8.0, 9.0, 2.0)
+MIN_OVERLAP = 0.5
+MIN_CELLS = 50
+
+
+def search_nearby(
+    aerial: NDArray, ground: NDArray, start: SE3, config: Refinement
+) -> SE3 | None:
+    """The level motion around a start whose height maps agree best.
+
+    Searches shifts within the configured radius and a few degrees of heading, first on
+    cells twice as large, then around the best on those configured. The height follows
+    from the mean difference (Delta z of Sec. VI-A).
+
+    Args:
+        aerial: (N, 3) points of the aerial surface.
+        ground: (M, 3) points of the ground map.
+        start: First guess of T_ground_aerial; only its heading is kept of its rotation.
+        config: Radius and resolution.
+
+    Returns:
+        T_ground_aerial, or None where the maps do not overlap.
+    """
+    centre = aerial.mean(axis=0)
+    place = start @ centre
+    best: tuple[float, float, NDArray[np.float64], float] | None = None
+    headings = start.heading() + np.deg2rad(HEADINGS_DEG)
+    radius_m, shift = config.local_search_radius_m, np.zeros(2)
+    for coarse in (COARSE, 1):
+        cells_per_m = config.local_search_cells_per_m / coarse
+        ground_map = make_height_map(ground, cells_per_m)
+        reach = int(np.ceil(radius_m * cells_per_m))
+        best = None
+        for heading in headings:
+            turned = SE3.from_heading(heading, (*(place[:2] + shift), 0.0))
+            turned_map = make_height_map(turned @ (aerial - centre), cells_per_m)
+            cost, offset, height = _best_shift(turned_map, ground_map, reach)
+            if best is None or cost < best[0]:
+                best = (cost, float(heading), shift + offset / cells_per_m, height)
+        assert best is not None
+        if not np.isfinite(best[0]):
+            return None
+        # Around the best, by one coarse cell and one step of the heading.
+        headings = best[1] + np.deg2rad([-1.0, 0.0, 1.0])
+        radius_m, shift = 2.0 / cells_per_m, best[2]
+    _, heading, shift, height = best
+    turned = SE3.from_heading(heading)
+    target = np.array([*(place[:2] + shift), centre[2] + height])
+    # `height` lifts heights about the centroid, which lost the centroid's own.
+    target[2] = height
+    return SE3(turned.rotation, target - turned @ centre)
+
+
+def _best_shift(
+    aerial: HeightMap, ground: HeightMap, reach: int
+) -> tuple[float, NDArray[np.int64], float]:
+    """Lowest cost [m^2], its shift [cells] and height offset [m] within `reach` cells."""
+    first = lattice_index(aerial) - lattice_index(ground)
+    costs, counts, heights = _shift_costs(aerial.heights, ground.heights, first, reach)
+    # An overlap much smaller than others nearby fits by chance.
+    costs[counts < max(MIN_CELLS, MIN_OVERLAP * counts.max())] = np.inf
+    ix, iy = np.unravel_index(np.argmin(costs), costs.shape)
+    return float(costs[ix, iy]), np.array([ix, iy]) - reach, float(heights[ix, iy])
+
+
+@njit(cache=True, error_model="numpy", parallel=True)
+def _shift_costs(
+    aerial: NDArray, ground: NDArray, first: NDArray, reach: int
+) -> tuple[NDArray, NDArray, NDArray]:
+    """Eq. 2, overlapping cells and mean height difference for every shift; NaN is a hole."""
+    side = 2 * reach + 1
+    costs = np.full((side, side), np.inf)
+    counts = np.zeros((side, side))
+    heights = np.zeros((side, side))
+    for sx in prange(side):
+        for sy in range(side):
+            x0, y0 = first[0] + sx - reach, first[1] + sy - reach
+            low, high = max(0, -y0), min(aerial.shape[1], ground.shape[1] - y0)
+            count, total, squares = 0.0, 0.0, 0.0
+            for ix in range(max(0, -x0), min(aerial.shape[0], ground.shape[0] - x0)):
+                if low < high:
+                    sums = _row_sums(aerial[ix, low:high], ground[x0 + ix, y0 + low : y0 + high])
+                    count += sums[0]
+                    total += sums[1]
+                    squares += sums[2]
+            if count > 0:
+                counts[sx, sy] = count
+                heights[sx, sy] = total / count
+                costs[sx, sy] = (squares / count - (total / count) ** 2) / 2
+    return costs, counts, heights
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
+def _row_sums(aerial: NDArray, ground: NDArray) -> tuple[float, float, float]:
+    zero, one = np.float32(0), np.float32(1)
+    count, total, squares = zero, zero, zero
+    for i in range(len(aerial)):
+        difference = ground[i] - aerial[i]
+        seen = difference == difference
+        difference = difference if seen else zero
+        count += one if seen else zero
+        total += difference
+        squares += difference * difference
+    return count, total, squares

@@ -1,0 +1,119 @@
+"""From a rough relative pose to a precise one, or a refusal with its reason (Sec. VII)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.config import Config, Refinement
+from airground.core.belief import Alignment
+from airground.core.cloud import PointCloud
+from airground.core.height_map import lattice_index, make_height_map
+from airground.core.se3 import SE3
+from airground.refinement.icp import point_to_plane_icp
+from airground.refinement.local_search import search_nearby
+from airground.refinement.surfels import Surfels, make_surfels
+
+MIN_POINTS = 200
+COVER_CELLS_PER_M = 25.0
+
+
+def refine(
+    stamp_ns: int,
+    T_ground_mav_start: SE3,
+    aerial: PointCloud,
+    ground: PointCloud,
+    config: Config,
+) -> Alignment:
+    """Align an aerial cloud with the ground map.
+
+    Args:
+        stamp_ns: Of the aerial surface.
+        T_ground_mav_start: First guess.
+        aerial: In the frame `mav`.
+        ground: In the frame `ground`.
+        config: Its section `refinement` is used.
+
+    Returns:
+        The refined motion and whether it may be used. Clouds that are too small or do not
+        overlap give a refusal with the start unchanged, never an exception.
+    """
+    settings = config.refinement
+    for name, cloud in (("aerial", aerial), ("ground", ground)):
+        if len(cloud) < MIN_POINTS:
+            refusal = f"the {name} cloud has {len(cloud)} points, at least {MIN_POINTS} are needed"
+            return _refused(stamp_ns, T_ground_mav_start, refusal)
+    nearby = _nearby(ground.points, T_ground_mav_start @ aerial.points, settings)
+    if len(nearby) < MIN_POINTS:
+        refusal = "no overlap: the ground map has nothing below the aerial surface"
+        return _refused(stamp_ns, T_ground_mav_start, refusal)
+
+    # A better start than the guess: nearby, the height maps say where.
+    start = _levelled(T_ground_mav_start, aerial.points) if settings.level_prior else (
+        T_ground_mav_start
+    )
+    if settings.local_search:
+        found = search_nearby(aerial.points, nearby, start, settings)
+        if found is None:
+            return _refused(stamp_ns, start, "no overlap of the height maps around the start")
+        start = found
+
+    # Point-to-plane ICP.
+    source = make_surfels(aerial.points, settings.voxel_m)
+    target = make_surfels(nearby, settings.voxel_m)
+    fit = point_to_plane_icp(source.points, target, start, settings)
+    return _judged(stamp_ns, fit.T_target_source, source, target, settings)
+
+
+def _refused(stamp_ns: int, motion: SE3, refusal: str) -> Alignment:
+    return Alignment(stamp_ns, motion, 0.0, float("nan"), False, refusal)
+
+
+def _nearby(ground: NDArray, aerial_ground: NDArray, settings: Refinement) -> NDArray:
+    """Ground points that some correspondence could use, wherever the search ends."""
+    margin = settings.max_distance_m
+    if settings.local_search:
+        margin += settings.local_search_radius_m + 0.3
+    low, high = aerial_ground.min(axis=0)[:2] - margin, aerial_ground.max(axis=0)[:2] + margin
+    inside = ((ground[:, :2] >= low) & (ground[:, :2] <= high)).all(axis=1)
+    return ground[inside]
+
+
+def _levelled(motion: SE3, points: NDArray) -> SE3:
+    """The same place of the points' middle, with only the heading of the rotation."""
+    centre = points.mean(axis=0, dtype=np.float64)
+    turned = SE3.from_heading(motion.heading())
+    return SE3(turned.rotation, motion @ centre - turned @ centre)
+
+
+def _judged(
+    stamp_ns: int, motion: SE3, source: Surfels, target: Surfels, settings: Refinement
+) -> Alignment:
+    """Inliers, their distances, and whether they suffice."""
+    moved = motion @ source.points
+    index, squared = target.nearest(moved)
+    normals = target.normals[index]
+    along = np.abs(((moved - target.points[index]) * normals).sum(axis=1))
+    covered = _covered(moved, target.points)
+    inlier = covered & (squared < settings.final_distance_m**2)
+    share = float(inlier.sum() / max(covered.sum(), 1))
+    rmse_m = float(np.sqrt((along[inlier] ** 2).mean())) if inlier.any() else float("nan")
+    refusal = ""
+    if covered.sum() < MIN_POINTS:
+        refusal = "no overlap: the ground map has nothing below the aerial surface"
+    elif share < settings.min_inliers:
+        refusal = (
+            f"only {share:.0%} of the aerial points over the ground map lie on it, "
+            f"{settings.min_inliers:.0%} are needed"
+        )
+    return Alignment(stamp_ns, motion, share, rmse_m, not refusal, refusal)
+
+
+def _covered(points: NDArray, ground: NDArray) -> NDArray[np.bool_]:
+    """(N,) which points are over cells that the ground robot saw something of."""
+    cover = make_height_map(ground, COVER_CELLS_PER_M)
+    cells = np.floor(points[:, :2] * COVER_CELLS_PER_M + 0.5).astype(int) - lattice_index(cover)
+    shape = cover.heights.shape
+    inside = ((cells >= 0) & (cells < shape)).all(axis=1)
+    cells[~inside] = 0
+    return inside & np.isfinite(cover.heights[cells[:, 0], cells[:, 1]])

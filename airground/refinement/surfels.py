@@ -1,0 +1,50 @@
+"""Clouds as ICP wants them: thinned evenly, each point with the plane around it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import small_gicp
+from numpy.typing import NDArray
+
+NEIGHBOURS = 10
+
+
+@dataclass(frozen=True, eq=False)
+class Surfels:
+    """Points with normals, and a tree to find the nearest.
+
+    Attributes:
+        points: (N, 3) float64 [m].
+        normals: (N, 3) float64 unit vectors, z up; zero where the plane is unknown.
+        tree: Over `points`.
+    """
+
+    points: NDArray[np.float64]
+    normals: NDArray[np.float64]
+    tree: small_gicp.KdTree
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def nearest(self, points: NDArray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """(N,) index of the nearest point, and (N,) squared distance to it [m^2]."""
+        index, squared = self.tree.batch_nearest_neighbor_search(points, num_threads=2)
+        return np.asarray(index, np.int64), np.asarray(squared)
+
+
+def make_surfels(points: NDArray, voxel_m: float) -> Surfels:
+    """Average points over cubes and fit a plane to each one's neighbours.
+
+    Args:
+        points: (N, 3) [m], at least one.
+        voxel_m: Side of the cubes [m].
+    """
+    # One thread where the result would depend on how many there are.
+    cloud = small_gicp.voxelgrid_sampling(np.asarray(points, np.float64), voxel_m, num_threads=1)
+    tree = small_gicp.KdTree(cloud, num_threads=1)
+    small_gicp.estimate_normals(cloud, tree, num_neighbors=NEIGHBOURS, num_threads=2)
+    normals = np.array(cloud.normals()[:, :3])
+    normals[normals[:, 2] < 0] *= -1
+    return Surfels(np.array(cloud.points()[:, :3]), normals, tree)
