@@ -1,12 +1,13 @@
 # `make demo` on a bare Debian or Ubuntu leaves results/demo/report.html; the rest is in README.md.
 PYTHON_IN_VENV := .venv/bin/python
 READY := .venv/.ready
+OUT ?= results/demo
 
 .PHONY: demo setup test test-slow check format clean
 
 demo: $(READY)
-	rm -rf results/demo
-	.venv/bin/airground reproduce --quick --out results/demo
+	rm -rf $(OUT)
+	.venv/bin/airground reproduce --quick --out $(OUT)
 
 setup: $(READY)
 

@@ -98,7 +98,7 @@ def _first_part(box: str) -> str:
 
     The frame is drawn with lines, or with hyphens where the screen's encoding lacks them.
     """
-    words = []
+    words: list[str] = []
     for line in box.splitlines()[1:]:
         is_rule = not line.strip("│├┤╭╮╰╯─- ")
         if is_rule and words:

@@ -11,7 +11,7 @@ from evaluation.commands.words import OutWord, SeedWord, SensorWord, Verb, in_ra
 
 
 @dataclass(frozen=True, kw_only=True)
-class Simulate(OutWord, SeedWord, SensorWord, Verb):
+class Simulate(Verb, SensorWord, SeedWord, OutWord):
     """Record what the robots' sensors see in a scene.
 
     Drops the boxes, flies and drives both robots, renders their cameras, and keeps the truth
@@ -42,6 +42,6 @@ class Simulate(OutWord, SeedWord, SensorWord, Verb):
             sensor_preset(self.sensors),
             self.out,
             self.duration_s,
-            self.threads,
+            self.workers(),
             flight=int(in_range("--flight", self.flight)),
         )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from tyro.conf import UseAppendAction, arg
 
 from airground.errors import InputError
+from evaluation.environment import usable_cores
 
 if TYPE_CHECKING:
     from airground.config import Config
@@ -27,6 +28,10 @@ class Verb:
         None
     )
     """Threads and processes to use."""
+
+    def workers(self) -> int:
+        """How many threads or processes to use."""
+        return self.threads or usable_cores()
 
     def main(self) -> int | None:
         """Do it; returns the exit code, None for 0."""

@@ -1,0 +1,97 @@
+"""`airground reproduce`: the paper's protocol, from scenes to report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import arg
+
+from evaluation.commands.words import OutWord, SeedWord, SensorWord, SetupWords, Verb, in_range
+
+if TYPE_CHECKING:
+    from evaluation.reproduce import Plan
+
+SCENES = ("indoor_a", "indoor_b", "indoor_c", "flat")
+FLIGHTS, SEQUENCES, TRIALS = 2, 7, 12
+"""Over three scenes with structure: 42 sequences and 72 trials; the paper has 41 and 67."""
+
+QUICK_SCENES = ("tiny",)
+QUICK_FLIGHTS, QUICK_SEQUENCES, QUICK_TRIALS = 1, 4, 8
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reproduce(Verb, SetupWords, SensorWord, SeedWord, OutWord):
+    """Do all of it: the paper's protocol, from scenes to report.
+
+    Records flights over several scenes, measures the setup asked for and, beside it, those
+    that the report compares it with, and writes results.parquet, summary.json, report.html.
+    """
+
+    quick: bool = False
+    """One small scene and a short flight: minutes instead of hours."""
+    alone: bool = False
+    """Measure only the setup asked for, nothing beside it."""
+    scenes: Annotated[
+        tuple[str, ...],
+        arg(metavar="SCENE ...", help_behavior_hint=f"(default: {' '.join(SCENES)})"),
+    ] = ()
+    """Scenes to fly over."""
+    flights: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {FLIGHTS})")] = (
+        None
+    )
+    """Flights over each scene."""
+    sequences: Annotated[
+        int | None, arg(metavar="N", help_behavior_hint=f"(default: {SEQUENCES})")
+    ] = None
+    """Sequences of 12 aerial maps a flight."""
+    trials: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {TRIALS})")] = (
+        None
+    )
+    """Refinements from a noisy start a flight."""
+    recordings: Annotated[
+        Path | None, arg(metavar="DIR", help_behavior_hint="(default: recordings/ in --out)")
+    ] = None
+    """Where recordings are kept; those that are there already are used again."""
+
+    def main(self) -> None:
+        from evaluation.output import fresh_folder
+        from evaluation.reproduce import reproduce
+        from evaluation.results_folder import Results
+        from evaluation.screen import print_summary
+
+        plan = self.plan()
+        with fresh_folder(self.out) as folder:
+            findings = reproduce(plan, self.recordings or folder / "recordings", self.workers())
+            results = Results(findings.table, plan.setups[0].config, plan.seed, findings.showcase)
+            summary = results.write(folder)
+        print_summary(summary)
+
+    def plan(self) -> Plan:
+        """What the words ask for, checked."""
+        from evaluation.experiment import Protocol
+        from evaluation.reproduce import Plan
+        from evaluation.setups import with_companions
+        from sim.presets import sensor_preset
+        from sim.scene import load_scene
+
+        setup = self.setup()
+        scenes = self.scenes or (QUICK_SCENES if self.quick else SCENES)
+        return Plan(
+            scenes=[load_scene(scene) for scene in scenes],
+            flights=self._count("flights", QUICK_FLIGHTS, FLIGHTS),
+            setups=[setup] if self.alone else with_companions(setup),
+            sensors=sensor_preset(self.sensors),
+            protocol=Protocol(
+                sequences=self._count("sequences", QUICK_SEQUENCES, SEQUENCES),
+                trials=self._count("trials", QUICK_TRIALS, TRIALS),
+            ),
+            seed=self.checked_seed(),
+        )
+
+    def _count(self, name: str, quick: int, full: int) -> int:
+        asked = getattr(self, name)
+        if asked is None:
+            return quick if self.quick else full
+        return int(in_range(f"--{name}", asked, low=1))
