@@ -2,40 +2,109 @@
 
 from __future__ import annotations
 
+import cv2
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.bake_light import LightBaker
+from sim.floor import paint_concrete, paint_plaster, paint_print
+from sim.noise import Image
+from sim.pictures import add_picture
 from sim.scene import Room
+from sim.sheet import light_up
 from sim.surface import Mesh, join, rectangle_mesh
 
+FLOOR_PX_PER_M = 560.0
+WALL_PX_PER_M = 300.0
+LIGHT_CELL_M = 0.025
 COLLISION_GROUP = 3
 """Geoms of this group collide and are never drawn."""
 
 
-def add_plain_room(spec: mujoco.MjSpec, room: Room) -> None:
-    """Add floor and walls in plain colours."""
-    half_x, half_y = (side / 2 for side in room.size_m)
+def add_room(
+    spec: mujoco.MjSpec, room: Room, baker: LightBaker | None, rng: np.random.Generator
+) -> None:
+    """Add the floor, the walls and the invisible plane on which things stand.
+
+    Args:
+        baker: Lights the pictures; without it, surfaces get plain colours.
+        rng: Draws the pictures.
+    """
     add_ground_plane(spec)
+    _add_floor(spec, room, baker, rng)
+    for index, (centre, normal, half_width) in enumerate(_walls(room)):
+        name = f"wall_{index}"
+        half_size = np.array([half_width, room.wall_height_m / 2])
+        if baker:
+            pixels = paint_plaster((2 * half_size[0], 2 * half_size[1]), WALL_PX_PER_M, rng)
+            right = np.cross([0.0, 0.0, 1.0], normal)
+            light = _light_map(baker, centre, right * half_size[0], np.array([0, 0, half_size[1]]))
+            add_picture(spec, name, _lit(pixels, light), cube=False)
+        _add_panel(spec, name, half_size, centre, _wall_quaternion(normal), baker is not None)
+
+
+def _add_floor(
+    spec: mujoco.MjSpec, room: Room, baker: LightBaker | None, rng: np.random.Generator
+) -> None:
+    """Four panels that share one picture, so that nothing repeats and no texture is too large."""
+    half = np.array(room.size_m) / 2
+    picture = None
+    if baker:
+        paint = paint_concrete if room.floor == "concrete" else paint_print
+        light = _light_map(baker, np.zeros(3), np.array([half[0], 0, 0]), np.array([0, half[1], 0]))
+        picture = _lit(paint(room.size_m, FLOOR_PX_PER_M, rng), light)
+    for index, (sx, sy) in enumerate(((-1, 1), (1, 1), (-1, -1), (1, -1))):
+        name = f"floor_{index}"
+        if picture is not None:
+            rows, columns = (n // 2 for n in picture.shape[:2])
+            top, left = (0 if sy > 0 else rows), (0 if sx < 0 else columns)
+            add_picture(spec, name, picture[top : top + rows, left : left + columns], cube=False)
+        centre = np.array([sx * half[0] / 2, sy * half[1] / 2, 0])
+        _add_panel(spec, name, half / 2, centre, np.array([1.0, 0, 0, 0]), picture is not None)
+
+
+def _add_panel(
+    spec: mujoco.MjSpec,
+    name: str,
+    half_size: NDArray,
+    centre: NDArray,
+    quat: NDArray,
+    picture: bool,
+) -> None:
+    """A rectangle that is seen but not touched."""
     spec.worldbody.add_geom(
-        name="floor",
+        name=name,
         type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[half_x, half_y, 0.1],
+        size=[*half_size, 0.1],
+        pos=centre,
+        quat=quat,
         contype=0,
         conaffinity=0,
-        rgba=[0.55, 0.55, 0.54, 1],
+        **({"material": name} if picture else {"rgba": [0.62, 0.61, 0.58, 1]}),
     )
-    for index, (centre, normal, half_width) in enumerate(_walls(room)):
-        spec.worldbody.add_geom(
-            name=f"wall_{index}",
-            type=mujoco.mjtGeom.mjGEOM_PLANE,
-            size=[half_width, room.wall_height_m / 2, 0.1],
-            pos=centre,
-            quat=_wall_quaternion(normal),
-            contype=0,
-            conaffinity=0,
-            rgba=[0.8, 0.8, 0.77, 1],
-        )
+
+
+def _light_map(
+    baker: LightBaker, centre: NDArray, half_right: NDArray, half_up: NDArray
+) -> NDArray[np.float32]:
+    """(rows, columns, 3) light factors over a rectangle, the first row at its top."""
+    rows, columns = (
+        int(np.ceil(2 * np.linalg.norm(half) / LIGHT_CELL_M)) for half in (half_up, half_right)
+    )
+    v = 1 - (np.arange(rows) + 0.5) / rows * 2
+    u = (np.arange(columns) + 0.5) / columns * 2 - 1
+    points = centre + u[None, :, None] * half_right + v[:, None, None] * half_up
+    normal = np.cross(half_right, half_up)
+    normals = np.broadcast_to(normal / np.linalg.norm(normal), points.shape)
+    light = baker.shade(points.reshape(-1, 3), normals.reshape(-1, 3))
+    return cv2.GaussianBlur(light.reshape(rows, columns, 3), (3, 3), 0)
+
+
+def _lit(pixels: Image, light: NDArray[np.float32]) -> NDArray[np.uint8]:
+    out = np.empty(pixels.shape, np.uint8)
+    light_up(pixels, light, out)
+    return out
 
 
 def add_ground_plane(spec: mujoco.MjSpec) -> None:
@@ -54,7 +123,9 @@ def room_mesh(room: Room) -> Mesh:
     half_x, half_y = (side / 2 for side in room.size_m)
     meshes = [
         rectangle_mesh(
-            np.array([-half_x, -half_y, 0]), np.array([2 * half_x, 0, 0]), [0, 2 * half_y, 0]
+            np.array([-half_x, -half_y, 0]),
+            np.array([2 * half_x, 0, 0]),
+            np.array([0, 2 * half_y, 0]),
         )
     ]
     for centre, normal, half_width in _walls(room):

@@ -10,11 +10,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from airground.core.arrays import read_only
-from sim.room import add_plain_room, room_mesh
+from sim.bake_light import LightBaker
+from sim.cardboard import Make
+from sim.pictures import add_picture, paint_boxes
+from sim.room import add_room, room_mesh
 from sim.rubble import Box, make_heap
 from sim.scene import Scene
-from sim.surface import box_mesh, join
+from sim.surface import Mesh, box_mesh, join
 
+_FLOOR_ALBEDO = (0.32, 0.31, 0.29)
+_BOX_ALBEDO = (0.42, 0.28, 0.15)
 OFFSCREEN_PX = (1280, 960)
 
 
@@ -59,16 +64,28 @@ def build_world(scene: Scene, seed: int, pictures: bool = True) -> World:
         pictures: Without them surfaces have plain colours: the same geometry much sooner,
             for physics and truth.
     """
-    geometry_rng, _picture_rng = np.random.default_rng(
-        [seed, zlib.crc32(scene.name.encode())]
-    ).spawn(2)
+    seeds = np.random.default_rng([seed, zlib.crc32(scene.name.encode())])
+    geometry_rng, picture_rng = seeds.spawn(2)
     boxes = make_heap(scene, geometry_rng)
+    box_meshes = [box_mesh(box.size_m, box.T_world_box) for box in boxes]
+    surface = join([room_mesh(scene.room), *box_meshes])
     spec = _empty_spec()
-    add_plain_room(spec, scene.room)
-    for box in boxes:
-        _add_box(spec, box)
-    meshes = [room_mesh(scene.room), *(box_mesh(box.size_m, box.T_world_box) for box in boxes)]
-    return World(scene, seed, spec, *join(meshes), boxes)
+    baker = None
+    if pictures:
+        spec.visual.headlight.active = 0
+        baker = _baker(scene, box_meshes)
+    add_room(spec, scene.room, baker, picture_rng)
+    _add_boxes(spec, scene, boxes, baker, picture_rng)
+    return World(scene, seed, spec, *surface, boxes)
+
+
+def _baker(scene: Scene, box_meshes: list[Mesh]) -> LightBaker:
+    """Floor and boxes throw shadows; walls do not, for lamps hang inside the room."""
+    floor = room_mesh(scene.room.model_copy(update={"wall_height_m": 0.0}))
+    mesh = join([floor, *box_meshes])
+    albedo = np.tile(_BOX_ALBEDO, (len(mesh[1]), 1))
+    albedo[: len(floor[1])] = _FLOOR_ALBEDO
+    return LightBaker.of(mesh, albedo, scene.light)
 
 
 def _empty_spec() -> mujoco.MjSpec:
@@ -81,13 +98,25 @@ def _empty_spec() -> mujoco.MjSpec:
     return spec
 
 
-def _add_box(spec: mujoco.MjSpec, box: Box) -> None:
-    quaternion = box.T_world_box.quaternion_xyzw()
-    spec.worldbody.add_geom(
-        name=box.name,
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        size=box.size_m / 2,
-        pos=box.T_world_box.translation,
-        quat=np.roll(quaternion, 1),
-        rgba=[0.72, 0.55, 0.36, 1],
-    )
+def _add_boxes(
+    spec: mujoco.MjSpec,
+    scene: Scene,
+    boxes: tuple[Box, ...],
+    baker: LightBaker | None,
+    rng: np.random.Generator,
+) -> None:
+    """Add every box as a geom of its name, with its own six pictures if they are lit."""
+    if baker and scene.rubble:
+        makes = [Make.draw(rng) for _ in range(scene.rubble.makes)]
+        pictures = paint_boxes(boxes, makes, baker, rng)
+        for box, picture in zip(boxes, pictures, strict=True):
+            add_picture(spec, box.name, picture, cube=True)
+    for box in boxes:
+        spec.worldbody.add_geom(
+            name=box.name,
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=box.size_m / 2,
+            pos=box.T_world_box.translation,
+            quat=np.roll(box.T_world_box.quaternion_xyzw(), 1),
+            **({"material": box.name} if baker else {"rgba": [0.72, 0.55, 0.36, 1]}),
+        )
