@@ -150,7 +150,7 @@ class Refinement(Section):
     """Search the height maps around the start before ICP."""
     local_search_radius_m: Positive = 0.6
     """Half the side of that search [m]."""
-    local_search_cells_per_m: Positive = 50.0
+    local_search_cells_per_m: Positive = 25.0
     """Its resolution [cells/m]."""
     level_prior: bool = True
     """Both maps are gravity-aligned: keep only the heading of a prior's rotation."""

@@ -32,18 +32,14 @@ def make_height_map(
         The map in the frame of the points; one empty cell where there are no points.
     """
     points = np.ascontiguousarray(points, np.float32)
+    scale = np.float32(cells_per_m)
     if window is None:
-        seen = points[np.isfinite(points).all(axis=1), :2]
-        corners = (seen.min(axis=0), seen.max(axis=0)) if len(seen) else (np.zeros(2),) * 2
+        extent = _cell_extent(points, scale)
+        first, last = extent if (extent[0] <= extent[1]).all() else np.zeros((2, 2), np.int64)
     else:
-        corners = (np.asarray(window[0]), np.asarray(window[1]))
-    # Rounded exactly as the kernel rounds, float32 product included.
-    first, last = (
-        np.floor(corner.astype(np.float32) * np.float32(cells_per_m) + np.float32(0.5)).astype(int)
-        for corner in corners
-    )
+        first, last = (np.floor(np.asarray(corner) * scale + 0.5).astype(int) for corner in window)
     heights = np.full(tuple(last - first + 1), np.nan, np.float32)
-    _raise_cells(points, first[0], first[1], np.float32(cells_per_m), heights)
+    _raise_cells(points, first[0], first[1], scale, heights)
     if dilate_holes:
         heights = _dilate_holes(heights)
     return HeightMap(heights, first / cells_per_m, cells_per_m)
@@ -52,6 +48,22 @@ def make_height_map(
 def lattice_index(height_map: HeightMap) -> NDArray[np.int64]:
     """(2,) the origin of a map on the lattice of whole multiples of its cell size."""
     return np.rint(height_map.origin * height_map.cells_per_m).astype(np.int64)
+
+
+@njit(cache=True, error_model="numpy")
+def _cell_extent(points: NDArray, cells_per_m: float) -> NDArray[np.int64]:
+    """(2, 2) lowest and highest cell index of finite points; reversed without any."""
+    half = np.float32(0.5)
+    extent = np.array([[2**40, 2**40], [-(2**40), -(2**40)]])
+    for i in range(points.shape[0]):
+        finite = np.isfinite(points[i, 0]) and np.isfinite(points[i, 1])
+        if not (finite and np.isfinite(points[i, 2])):
+            continue
+        for axis in range(2):
+            index = int(np.floor(points[i, axis] * cells_per_m + half))
+            extent[0, axis] = min(extent[0, axis], index)
+            extent[1, axis] = max(extent[1, axis], index)
+    return extent
 
 
 @njit(cache=True, error_model="numpy")

@@ -1,5 +1,5 @@
 """Section VII: the aerial cloud is aligned with the ground robot's by point-to-plane ICP."""
 
-from airground.refinement.refine import refine
+from airground.refinement.alignment import refine
 
 __all__ = ["refine"]

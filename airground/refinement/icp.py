@@ -14,6 +14,8 @@ from airground.refinement.surfels import Surfels
 
 SETTLED_M = 1e-4
 MIN_CORRESPONDENCES = 50
+SPARSE = 3
+SPARSE_ABOVE_M = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +49,8 @@ def point_to_plane_icp(source: NDArray, target: Surfels, start: SE3, config: Ref
     factor = (config.final_distance_m / config.max_distance_m) ** (1.0 / falling)
     used = 0
     for _ in range(config.iterations):
-        moved = motion @ source
+        # While the distance is still large, a part of the points says as much as all.
+        moved = motion @ (source[::SPARSE] if distance > SPARSE_ABOVE_M else source)
         index, squared = target.nearest(moved)
         keep = _closest(squared, distance, config.trim)
         used = int(keep.sum())

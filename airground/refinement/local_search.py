@@ -11,20 +11,17 @@ from airground.core.belief import HeightMap
 from airground.core.height_map import lattice_index, make_height_map
 from airground.core.se3 import SE3
 
-COARSE = 2
 HEADINGS_DEG = np.arange(-8.0, 9.0, 2.0)
 MIN_OVERLAP = 0.5
 MIN_CELLS = 50
 
 
-def search_nearby(
-    aerial: NDArray, ground: NDArray, start: SE3, config: Refinement
-) -> SE3 | None:
+def search_nearby(aerial: NDArray, ground: NDArray, start: SE3, config: Refinement) -> SE3 | None:
     """The level motion around a start whose height maps agree best.
 
-    Searches shifts within the configured radius and a few degrees of heading, first on
-    cells twice as large, then around the best on those configured. The height follows
-    from the mean difference (Delta z of Sec. VI-A).
+    Searches shifts within the configured radius and a few degrees of heading, turned about
+    the middle of the aerial points; the height follows from the mean difference (Delta z
+    of Sec. VI-A).
 
     Args:
         aerial: (N, 3) points of the aerial surface.
@@ -35,34 +32,21 @@ def search_nearby(
     Returns:
         T_ground_aerial, or None where the maps do not overlap.
     """
+    cells_per_m = config.local_search_cells_per_m
+    ground_map = make_height_map(ground, cells_per_m)
+    reach = int(np.ceil(config.local_search_radius_m * cells_per_m))
     centre = aerial.mean(axis=0)
-    place = start @ centre
-    best: tuple[float, float, NDArray[np.float64], float] | None = None
-    headings = start.heading() + np.deg2rad(HEADINGS_DEG)
-    radius_m, shift = config.local_search_radius_m, np.zeros(2)
-    for coarse in (COARSE, 1):
-        cells_per_m = config.local_search_cells_per_m / coarse
-        ground_map = make_height_map(ground, cells_per_m)
-        reach = int(np.ceil(radius_m * cells_per_m))
-        best = None
-        for heading in headings:
-            turned = SE3.from_heading(heading, (*(place[:2] + shift), 0.0))
-            turned_map = make_height_map(turned @ (aerial - centre), cells_per_m)
-            cost, offset, height = _best_shift(turned_map, ground_map, reach)
-            if best is None or cost < best[0]:
-                best = (cost, float(heading), shift + offset / cells_per_m, height)
-        assert best is not None
-        if not np.isfinite(best[0]):
-            return None
-        # Around the best, by one coarse cell and one step of the heading.
-        headings = best[1] + np.deg2rad([-1.0, 0.0, 1.0])
-        radius_m, shift = 2.0 / cells_per_m, best[2]
-    _, heading, shift, height = best
-    turned = SE3.from_heading(heading)
-    target = np.array([*(place[:2] + shift), centre[2] + height])
-    # `height` lifts heights about the centroid, which lost the centroid's own.
-    target[2] = height
-    return SE3(turned.rotation, target - turned @ centre)
+    place = np.array([*(start @ centre)[:2], 0.0])
+    best, lowest = None, np.inf
+    for heading in start.heading() + np.deg2rad(HEADINGS_DEG):
+        turned = SE3.from_heading(heading)
+        aerial_map = make_height_map((aerial - centre) @ turned.rotation.T + place, cells_per_m)
+        cost, shift, height = _best_shift(aerial_map, ground_map, reach)
+        if cost < lowest:
+            lowest = cost
+            target = np.array([*(place[:2] + shift / cells_per_m), height])
+            best = SE3(turned.rotation, target - turned @ centre)
+    return best
 
 
 def _best_shift(

@@ -52,14 +52,14 @@ def refine(
     start = _levelled(T_ground_mav_start, aerial.points) if settings.level_prior else (
         T_ground_mav_start
     )
+    source = make_surfels(aerial.points, settings.voxel_m)
     if settings.local_search:
-        found = search_nearby(aerial.points, nearby, start, settings)
+        found = search_nearby(source.points, nearby, start, settings)
         if found is None:
             return _refused(stamp_ns, start, "no overlap of the height maps around the start")
         start = found
 
     # Point-to-plane ICP.
-    source = make_surfels(aerial.points, settings.voxel_m)
     target = make_surfels(nearby, settings.voxel_m)
     fit = point_to_plane_icp(source.points, target, start, settings)
     return _judged(stamp_ns, fit.T_target_source, source, target, settings)
