@@ -13,13 +13,14 @@ from PIL import Image
 
 from evaluation import published
 from evaluation.figures.style import save_figure
+from evaluation.headline import headlines
 from evaluation.report_failures import control_table, failure_table
-from evaluation.report_figures import ReportFigure, report_figures
+from evaluation.report_figures import report_figures
 from evaluation.report_tables import comparison_table, scene_table, timing_table
-from evaluation.headline import Headline, headlines
-from evaluation.results import Condition, ResultTable
+from evaluation.results import Condition, ResultTable, shared_parts
 from evaluation.run_info import RunInfo
 from evaluation.showcase import Showcase
+from evaluation.showcase_figures import ReportFigure
 
 PICTURE_WIDTH_PX = 1500
 WEBP_QUALITY = 88
@@ -54,7 +55,8 @@ def write_report(
         showcase: What the pictures are drawn from; None leaves them out.
         run: Where the results come from.
         conditions: What to show, the primary one first; None shows all of the table. The
-            first three are drawn side by side, all stand in the comparison.
+            primary one, those of the other preset and then the rest are drawn side by side
+            (four at most); all stand in the comparison.
         notes: Sentences for "What to know": what missed its mark and why.
     """
     shown = list(conditions) if conditions is not None else table.conditions()
@@ -70,6 +72,7 @@ def write_report(
         run=run,
         headlines=headlines(measured, run.seed),
         comparison=comparison_table(table, shown),
+        shared=shared_parts(shown) if len(shown) > 1 else shown[0].label(),
         pictures=pictures,
         timing=timing_table(measured),
         by_scene=scene_table(primary),

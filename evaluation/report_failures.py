@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+import pandas as pd
+
 from evaluation.report_tables import MISSING, TextTable, degrees, metres
 from evaluation.results import Condition, ResultTable
 
@@ -16,7 +19,7 @@ def control_table(table: ResultTable, conditions: Sequence[Condition]) -> TextTa
         converged = part.sequences("converged")
         if len(converged) == 0:
             continue
-        ever = (converged.to_numpy(float) > 0).any(axis=1)
+        ever = np.nanmax(converged.to_numpy(np.float64), axis=1) > 0
         notes = part.rows("localization", "converged")["note"]
         said = notes[notes != ""].value_counts()
         reason = f"{said.index[0]} ({said.iloc[0]} of {len(notes)} updates)" if len(said) else ""
@@ -42,19 +45,18 @@ def _failed_sequences(table: ResultTable) -> list[tuple[str, ...]]:
     errors = table.sequences("error_m")
     if len(errors) == 0:
         return []
-    judged = min(4, int(errors.columns[-1]))
-    last = errors.columns[-1]
+    judged = min(4, errors.shape[1])
     notes = table.rows("localization", "converged").set_index(
         ["scene", "seed", "flight", "sequence", "iteration"]
     )["note"]
-    rows = []
-    for key, error in errors.iterrows():
-        if error[judged] <= 0.25:
+    rows: list[tuple[str, ...]] = []
+    for key, error in zip(errors.index.to_list(), errors.to_numpy(np.float64), strict=True):
+        off, finally_off = error[judged - 1], error[-1]
+        if off <= 0.25:
             continue
-        scene, _, flight, sequence = key  # type: ignore[misc]
-        result = f"{metres(error[judged])} after {judged}, {metres(error[last])} after {last}"
-        said = str(notes.get((*key, judged), "")) or "position claimed"  # type: ignore[misc]
-        result = result.replace(MISSING, "no estimate")
+        scene, _, flight, sequence = key
+        result = f"{_off(off)} after {judged}, {_off(finally_off)} after {len(error)}"
+        said = str(notes.get((*key, judged), "")) or "position claimed"
         rows.append(("sequence", str(scene), str(flight), str(sequence), result, said))
     return rows
 
@@ -64,15 +66,25 @@ def _failed_trials(table: ResultTable) -> list[tuple[str, ...]]:
     if "after_translation_m" not in trials:
         return []
     notes = table.rows("refinement", "accepted").set_index(["scene", "seed", "flight", "trial"])
-    rows = []
-    for key, trial in trials.iterrows():
-        scene, seed, flight, _, number = key  # type: ignore[misc]
-        metres_off, degrees_off = trial["after_translation_m"], trial["after_rotation_deg"]
-        accepted = trial.get("accepted", 1.0) > 0
+    rows: list[tuple[str, ...]] = []
+    accepted_at = trials["accepted"] if "accepted" in trials else pd.Series(1.0, trials.index)
+    for key, metres_off, degrees_off, accepted_value in zip(
+        trials.index.to_list(),
+        trials["after_translation_m"],
+        trials["after_rotation_deg"],
+        accepted_at,
+        strict=True,
+    ):
+        scene, seed, flight, _, number = key
+        accepted = accepted_value > 0
         if accepted and metres_off <= 0.05 and degrees_off <= 2.0:
             continue
         note = notes["note"].get((scene, seed, flight, number), "") if len(notes) else ""
-        result = f"{metres(metres_off)}, {degrees(degrees_off)}".replace(MISSING, "no estimate")
+        result = f"{_off(metres_off)}, {degrees(degrees_off)}"
         said = f"refused: {note}" if not accepted else "accepted"
         rows.append(("refinement", str(scene), str(flight), str(number), result, said))
     return rows
+
+
+def _off(metres_off: float) -> str:
+    return metres(metres_off) if np.isfinite(metres_off) else "no estimate"

@@ -4,67 +4,66 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TypeVar
 
-from matplotlib.figure import Figure
+import numpy as np
+from numpy.typing import NDArray
 
 from evaluation import published
 from evaluation.figures.before_after import BeforeAfter
-from evaluation.figures.fig05_15_augmented import augmented_figure
-from evaluation.figures.fig06_depth_maps import depth_maps_figure
-from evaluation.figures.fig07_height_maps import height_maps_figure
-from evaluation.figures.fig08_particles import particles_figure
 from evaluation.figures.fig11_localization_error import localization_error_figure
 from evaluation.figures.fig12_spread import spread_figure
 from evaluation.figures.fig13_refinement_translation import refinement_translation_figure
 from evaluation.figures.fig14_refinement_angle import refinement_angle_figure
+from evaluation.figures.style import SERIES
 from evaluation.figures.table1_timing import timing_figure
-from evaluation.results import Condition, ResultTable
-from evaluation.scene_pictures import aerial_viewpoint, render_augmented_map, robot_viewpoint
+from evaluation.results import Condition, ResultTable, shared_parts, short_labels
 from evaluation.showcase import Showcase
+from evaluation.showcase_figures import ReportFigure, showcase_figures
 
-T = TypeVar("T")
-
-COMPARED = 3
+COMPARED = len(SERIES)
 """Conditions drawn side by side; more would not be told apart."""
 
 
 @dataclass(frozen=True)
-class ReportFigure:
-    """A figure and what stands under it.
+class Drawn:
+    """One condition as figures show it."""
 
-    Attributes:
-        name: Of its files.
-        title: For the heading.
-        caption: What is shown, under which conditions, beside which published value.
-        figure: The drawing.
-        wide: Whether it needs the full width of a page.
-    """
-
-    name: str
-    title: str
-    caption: str
-    figure: Figure
-    wide: bool = True
+    condition: Condition
+    table: ResultTable
+    label: str
+    colour: str
 
 
 def report_figures(
     table: ResultTable, conditions: Sequence[Condition], showcase: Showcase | None
 ) -> Iterator[ReportFigure]:
-    """Draw what there is data for, in the order in which one would tell the story."""
-    measured = {c: table.of(c).without_controls() for c in conditions}
-    yield from _localization(measured)
-    yield from _refinement(measured)
+    """Draw what there is data for, in the paper's order."""
     if showcase is not None:
-        yield from _showcase(showcase)
-    yield from _timing(measured)
+        yield from showcase_figures(showcase)
+    drawn = _chosen(table, conditions)
+    yield from _localization(drawn)
+    yield from _refinement(drawn)
+    yield from _timing(drawn[0])
 
 
-def _localization(measured: dict[Condition, ResultTable]) -> Iterator[ReportFigure]:
-    compared = _first({c: t for c, t in measured.items() if len(t.sequences("error_m"))})
-    if not compared:
+def _chosen(table: ResultTable, conditions: Sequence[Condition]) -> list[Drawn]:
+    """The primary condition, those of the other preset, then the rest: four at most."""
+    primary = conditions[0]
+    ordered = sorted(conditions[1:], key=lambda c: c.preset == primary.preset)
+    chosen = [primary, *ordered][:COMPARED]
+    labels = short_labels(chosen)
+    return [
+        Drawn(c, table.of(c).without_controls(), label, colour)
+        for c, label, colour in zip(chosen, labels, SERIES, strict=False)
+    ]
+
+
+def _localization(drawn: list[Drawn]) -> Iterator[ReportFigure]:
+    shown = [d for d in drawn if len(d.table.sequences("error_m"))]
+    if not shown:
         return
-    counts = _counts({c: len(t.sequences("error_m")) for c, t in compared.items()}, "sequences")
+    counts = _counts(shown, [len(d.table.sequences("error_m")) for d in shown], "sequences")
+    colours = [d.colour for d in shown]
     yield ReportFigure(
         "fig11_localization_error",
         "Fig. 11: localization error over the iterations",
@@ -74,113 +73,90 @@ def _localization(measured: dict[Condition, ResultTable]) -> Iterator[ReportFigu
         "counts sequences without any estimate. Below: share of sequences within 0.5 and "
         "0.25 m with 95 % Wilson intervals; failures stay in. Red: the paper (65 % within 0.5 m "
         f"at iteration 1, 89 % within 0.25 m after 4, 41 sequences, real robots). {counts}",
-        localization_error_figure({c.label(): t.sequences("error_m") for c, t in compared.items()}),
+        localization_error_figure(_per_sequence(shown, "error_m"), colours),
     )
     yield ReportFigure(
         "fig12_spread",
         "Fig. 12: spread of the particles",
         "Standard deviation of the particles' positions. The paper's Fig. 12 shows the same "
         f"measure falling together with the error and prints no values. {counts}",
-        spread_figure({c.label(): t.sequences("spread_m") for c, t in compared.items()}),
+        spread_figure(_per_sequence(shown, "spread_m"), colours),
     )
 
 
-def _refinement(measured: dict[Condition, ResultTable]) -> Iterator[ReportFigure]:
-    trials = {c: t.trials() for c, t in measured.items()}
-    shown = _first({c: t for c, t in trials.items() if "after_translation_m" in t})
+def _per_sequence(drawn: list[Drawn], metric: str) -> dict[str, NDArray[np.float64]]:
+    return {d.label: d.table.sequences(metric).to_numpy(np.float64) for d in drawn}
+
+
+def _refinement(drawn: list[Drawn]) -> Iterator[ReportFigure]:
+    shown = _distinct([d for d in drawn if "after_translation_m" in d.table.trials()])
     if not shown:
         return
-    counts = _counts({c: len(t) for c, t in shown.items()}, "trials")
+    counts = _counts(shown, [len(d.table.trials()) for d in shown], "trials")
     start = (
         f"Trials start from the true pose with Gaussian noise of {published.START_NOISE_M.value} m "
         f"and {published.START_NOISE_DEG.value:g} deg per axis (the paper does not say whether "
-        "per axis or in magnitude). The figure under each box is its median. "
+        "per axis or in magnitude). The figure under each box is its median; refused "
+        "alignments stay in. "
     )
-    for name, number, quantity, metric, draw, paper in (
-        (
-            "fig13_refinement_translation", 13, "translation", "translation_m",
-            refinement_translation_figure, "0.076 m over 67 depth maps",
-        ),
-        (
-            "fig14_refinement_angle", 14, "angle", "rotation_deg",
-            refinement_angle_figure, "3.0 deg over 67 depth maps",
-        ),
+    for name, title, metric, draw, paper in (
+        ("fig13_refinement_translation", "Fig. 13: translation", "translation_m",
+         refinement_translation_figure, "0.076 m"),
+        ("fig14_refinement_angle", "Fig. 14: angle", "rotation_deg",
+         refinement_angle_figure, "3.0 deg"),
     ):  # fmt: skip
-        pairs = {
-            c.label(): BeforeAfter(t[f"before_{metric}"], t[f"after_{metric}"])
-            for c, t in shown.items()
-        }
+        pairs = {}
+        for d in shown:
+            trials = d.table.trials()
+            pairs[d.label] = BeforeAfter(trials[f"before_{metric}"], trials[f"after_{metric}"])
         yield ReportFigure(
             name,
-            f"Fig. {number}: {quantity} before and after refinement",
-            f"{start}Dashed: the paper's median after ICP, {paper}, real robots. {counts}",
-            draw(pairs),
+            f"{title} before and after refinement",
+            f"{start}Dashed: the paper's median after ICP, {paper} over 67 depth maps, real "
+            f"robots. {counts}",
+            draw(pairs, [d.colour for d in shown]),
             wide=False,
         )
 
 
-def _showcase(showcase: Showcase) -> Iterator[ReportFigure]:
-    conditions = f"Scene {showcase.scene}; {showcase.condition}."
-    yield ReportFigure(
-        "fig05_15_augmented",
-        "Fig. 5 and 15: the augmented map",
-        "Red: the ground robot's map. Grey: what the MAV added after refinement. Pyramids mark "
-        f"cameras along the paths. {conditions}",
-        augmented_figure(
-            render_augmented_map(showcase, robot_viewpoint(showcase)),
-            render_augmented_map(showcase, aerial_viewpoint(showcase)),
-        ),
-    )
-    yield ReportFigure(
-        "fig06_depth_maps",
-        "Fig. 6: depth maps and their fusion",
-        "Single depth maps, the surface fused from several, and the distance of every point to "
-        "the true surface. Pale pixels were rejected; the curve counts them as never within. "
-        f"The paper shows such maps without an error. {conditions}",
-        depth_maps_figure(showcase),
-    )
-    yield ReportFigure(
-        "fig07_height_maps",
-        "Fig. 7: height maps and cost map",
-        "Pale cells were not seen. Red: outline of the aerial map where its cost is lowest. "
-        f"Dark is a low cost; no cost where the overlap is too small. {conditions}",
-        height_maps_figure(showcase),
-    )
-    yield ReportFigure(
-        "fig08_particles",
-        "Fig. 8: particles over successive aerial maps",
-        "Green: particles after taking in the map; white: their covariance (2 sigma); cross: "
-        "the truth. Behind them the cost of every position, computed for the picture; the "
-        f"filter itself evaluates particles only after the first map. {conditions}",
-        particles_figure(showcase.steps),
-    )
+def _distinct(drawn: list[Drawn]) -> list[Drawn]:
+    """Without conditions that differ in localization only and so have the same trials."""
+    kept: list[Drawn] = []
+    for d in drawn:
+        after = d.table.trials()["after_translation_m"]
+        if not any(after.equals(k.table.trials()["after_translation_m"]) for k in kept):
+            kept.append(d)
+    return kept
 
 
-def _timing(measured: dict[Condition, ResultTable]) -> Iterator[ReportFigure]:
-    condition, table = next(iter(measured.items()))
+def _timing(primary: Drawn) -> Iterator[ReportFigure]:
     durations = {
-        stage.metric: table.values("timing", stage.metric)
+        stage.metric: primary.table.values("timing", stage.metric)
         for stage in published.TABLE_I
-        if len(table.values("timing", stage.metric))
+        if len(primary.table.values("timing", stage.metric))
     }
     if durations:
         yield ReportFigure(
             "table1_timing",
             "Table I: what each stage takes",
             f"Measured during the run itself, so beside other work on the same cores; "
-            f"{condition.label()}. Paper: {published.PLATFORM}.",
+            f"{primary.condition.label()}. Paper: {published.PLATFORM}.",
             timing_figure(durations),
         )
 
 
-def _first(measured: dict[Condition, T]) -> dict[Condition, T]:
-    return dict(list(measured.items())[:COMPARED])
-
-
-def _counts(counts: dict[Condition, int], what: str) -> str:
-    """ "41 sequences each" or the number for every condition."""
-    if len(set(counts.values())) == 1:
-        number = next(iter(counts.values()))
+def _counts(drawn: list[Drawn], counts: list[int], what: str) -> str:
+    """How many there are under which conditions."""
+    if len(set(counts)) == 1:
         each = " each" if len(counts) > 1 else ""
-        return f"Here: {number} {what}{each}; " + "; ".join(c.label() for c in counts) + "."
-    return "Here: " + "; ".join(f"{n} {what} ({c.label()})" for c, n in counts.items()) + "."
+        return f"Here: {counts[0]} {what}{each}; {_shared([d.condition for d in drawn])}."
+    listed = "; ".join(f"{n} {what} ({d.label})" for d, n in zip(drawn, counts, strict=True))
+    return f"Here: {listed}; {_shared([d.condition for d in drawn])}."
+
+
+def _shared(conditions: list[Condition]) -> str:
+    """What all conditions have in common, then what differs."""
+    if len(conditions) == 1:
+        return conditions[0].label()
+    shared = shared_parts(conditions)
+    return (f"all with {shared}: " if shared else "") + "; ".join(short_labels(conditions))

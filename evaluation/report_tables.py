@@ -9,11 +9,11 @@ import numpy as np
 import pandas as pd
 
 from evaluation import published
-from evaluation.results import Condition, ResultTable
+from evaluation.results import Condition, ResultTable, short_labels
 from evaluation.statistics import Rate, quantile, quantiles, rate_within, wilson
 from evaluation.summary import real_time_factor, within_5cm_2deg
 
-MISSING = "–"
+MISSING = "-"
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class TextTable:
 
     Attributes:
         header: One text per column.
-        rows: Tuples as long as the header.
+        rows: Tuples as long as the header; what follows a line break in a cell is detail.
     """
 
     header: tuple[str, ...]
@@ -45,11 +45,11 @@ def degrees(value: float) -> str:
 
 
 def rate(made: Rate) -> str:
-    """ "97.6 % (40 of 41; 87 to 100)" with the Wilson interval in percent."""
+    """The share; on a second line the counts and the Wilson interval in percent."""
     if made.total == 0:
         return MISSING
-    counts = f"{made.successes} of {made.total}; {100 * made.low:.0f} to {100 * made.high:.0f}"
-    return f"{100 * made.share:.1f} % ({counts})"
+    counts = f"{made.successes} of {made.total}; {100 * made.low:.0f} to {100 * made.high:.0f} %"
+    return f"{100 * made.share:.1f} %\n{counts}"
 
 
 def success_at(table: ResultTable, iteration: int, limit: float) -> Rate:
@@ -77,7 +77,7 @@ def claims(table: ResultTable, wrong_beyond_m: float = 0.5) -> tuple[Rate, Rate]
 def comparison_table(table: ResultTable, conditions: Sequence[Condition]) -> TextTable:
     """Every condition beside the paper: what the issue asks of a run, row by row."""
     measured = [table.of(condition).without_controls() for condition in conditions]
-    header = ("", "paper (real robots)", *(condition.label() for condition in conditions))
+    header = ("", "paper (real robots)", *short_labels(conditions))
     rows = [
         (name, paper, *(cell(part) for part in measured)) for name, paper, cell in _COMPARED_ROWS
     ]
@@ -153,23 +153,34 @@ def _error_after(table: ResultTable, iteration: int) -> str:
     return metres(quantile(errors[iteration], 0.5))
 
 
-def _trial_median(metric: str, text: Callable[[float], str]) -> Callable[[ResultTable], str]:
+def _trial_errors(when: str) -> Callable[[ResultTable], str]:
+    """Median translation and angle; the 95th percentiles below."""
+
     def cell(table: ResultTable) -> str:
         trials = table.trials()
-        return text(quantile(trials[metric], 0.5)) if metric in trials else MISSING
+        if f"{when}_translation_m" not in trials:
+            return MISSING
+        translation = quantiles(trials[f"{when}_translation_m"])
+        angle = quantiles(trials[f"{when}_rotation_deg"])
+        return (
+            f"{metres(translation.median)}, {degrees(angle.median)}\n"
+            f"95 %: {metres(translation.p95)}, {degrees(angle.p95)}"
+        )
 
     return cell
 
 
-def _trial_quantile(metric: str, q: float, text: Callable[[float], str]) -> Callable[[ResultTable], str]:
-    def cell(table: ResultTable) -> str:
-        trials = table.trials()
-        return text(quantile(trials[metric], q)) if metric in trials else MISSING
+def _surface(table: ResultTable) -> str:
+    median = quantile(table.values("surface", "error_median_m"), 0.5)
+    if np.isnan(median):
+        return MISSING
+    p90 = quantile(table.values("surface", "error_p90_m"), 0.5)
+    return f"{metres(median)}\n90 % of points: {metres(p90)}"
 
-    return cell
 
-
-def _median_of(stage: str, metric: str, text: Callable[[float], str]) -> Callable[[ResultTable], str]:
+def _median_of(
+    stage: str, metric: str, text: Callable[[float], str]
+) -> Callable[[ResultTable], str]:
     return lambda table: text(quantile(table.values(stage, metric), 0.5))
 
 
@@ -193,25 +204,16 @@ _COMPARED_ROWS: tuple[tuple[str, str, Callable[[ResultTable], str]], ...] = (
     ("within 0.25 m after 4", "89 %", lambda t: rate(success_at(t, 4, 0.25))),
     ("median error after 4", MISSING, lambda t: _error_after(t, 4)),
     ("median error after 12", MISSING, lambda t: _error_after(t, 12)),
-    ("position claimed at the end", MISSING, _claimed),
-    ("of these wrong by over 0.5 m", MISSING, _wrongly_claimed),
+    ("claims a position at the end", MISSING, _claimed),
+    ("claims that are off by over 0.5 m", MISSING, _wrongly_claimed),
     ("refinement trials", "67", lambda t: _count(len(t.trials()))),
-    ("start, median translation", MISSING, _trial_median("before_translation_m", metres)),
-    ("start, median angle", MISSING, _trial_median("before_rotation_deg", degrees)),
-    ("refined, median translation", "76 mm", _trial_median("after_translation_m", metres)),
-    ("refined, 95 % translation", MISSING, _trial_quantile("after_translation_m", 0.95, metres)),
-    ("refined, median angle", "3.0°", _trial_median("after_rotation_deg", degrees)),
+    ("start of refinement, median", MISSING, _trial_errors("before")),
+    ("refined, median", "76 mm, 3.0°", _trial_errors("after")),
+    ("the same started at the truth (bound)", MISSING, _trial_errors("from_truth")),
     ("refined within 5 cm and 2°", MISSING, lambda t: rate(wilson(*within_5cm_2deg(t)))),
-    (
-        "bound: refined from the truth, translation",
-        MISSING,
-        _trial_median("from_truth_translation_m", metres),
-    ),
-    ("bound: refined from the truth, angle", MISSING, _trial_median("from_truth_rotation_deg", degrees)),
-    ("MAV poses, RMS", "12 mm", _median_of("trajectory", "mav_ate_se3_rmse_m", metres)),
-    ("ground poses, RMS", "38 mm", _median_of("trajectory", "ground_ate_se3_rmse_m", metres)),
-    ("fused surface, median error", MISSING, _median_of("surface", "error_median_m", metres)),
-    ("fused surface, 90 % error", MISSING, _median_of("surface", "error_p90_m", metres)),
-    ("fused surface, completeness", MISSING, _median_of("surface", "completeness", _percent)),
-    ("recorded s / processing s", MISSING, _real_time),
+    ("MAV poses, RMS error", "12 mm", _median_of("trajectory", "mav_ate_se3_rmse_m", metres)),
+    ("ground poses, RMS error", "38 mm", _median_of("trajectory", "ground_ate_se3_rmse_m", metres)),
+    ("fused surface, median error", MISSING, _surface),
+    ("fused surface, pixels with depth", MISSING, _median_of("surface", "completeness", _percent)),
+    ("recorded over processing seconds", "real time\nwith a GPU", _real_time),
 )

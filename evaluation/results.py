@@ -56,17 +56,38 @@ class Condition:
     heading: str
     variant: str = ""
 
-    def label(self) -> str:
-        """One line for captions."""
+    def parts(self) -> tuple[str, ...]:
+        """What it consists of, in words."""
         poses = {"oracle exact": "exact poses", "oracle with drift": "poses with drift"}
         heading = {"known": "heading known", "search": "heading searched"}
-        parts = [
+        return (
             f"preset {self.preset}" + (f" ({self.variant})" if self.variant else ""),
             poses.get(self.poses, f"poses from {self.poses}"),
             f"{self.sensors} sensors" if self.sensors != "none" else "noise-free sensors",
             heading.get(self.heading, self.heading),
-        ]
-        return ", ".join(parts)
+        )
+
+    def label(self) -> str:
+        """One line for captions."""
+        return ", ".join(self.parts())
+
+
+def short_labels(conditions: Sequence[Condition]) -> list[str]:
+    """Labels that name only what differs between the conditions."""
+    columns = list(zip(*(condition.parts() for condition in conditions), strict=True))
+    differ = [len(set(column)) > 1 for column in columns]
+    if not any(differ):
+        return [condition.label() for condition in conditions]
+    return [
+        ", ".join(part for part, kept in zip(condition.parts(), differ, strict=True) if kept)
+        for condition in conditions
+    ]
+
+
+def shared_parts(conditions: Sequence[Condition]) -> str:
+    """What the short labels leave out because all conditions share it."""
+    columns = list(zip(*(condition.parts() for condition in conditions), strict=True))
+    return ", ".join(column[0] for column in columns if len(set(column)) == 1)
 
 
 @dataclass(frozen=True)

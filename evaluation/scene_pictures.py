@@ -234,7 +234,7 @@ def _mesh(
 
 def _eye_dome_lighting(
     colours: NDArray[np.uint8], depth: NDArray[np.float32], strength: float = 9.0
-) -> NDArray[np.float32]:
+) -> NDArray:
     """Darken pixels behind a nearer neighbour, at two scales.
 
     Args:

@@ -12,8 +12,8 @@ def print_summary(summary: Summary, console: Console | None = None) -> None:
     """Print the headline numbers of a summary beside the paper's."""
     poses = {"oracle": "oracle poses", "slam": "poses from SLAM"}[summary.poses]
     shown = Table(
-        title=f"{', '.join(summary.scenes)}: preset {summary.preset}, {poses}, seed {summary.seed}",
-        caption="same protocol, simulated; the paper measured real robots",
+        title=f"{', '.join(summary.scenes)}: preset {summary.preset}, {poses}",
+        caption="same protocol, simulated; the paper: real robots",
         title_justify="left",
         caption_justify="left",
     )
@@ -40,21 +40,21 @@ def _rows(summary: Summary) -> list[tuple[str, str, str]]:
         ("refinement trials", str(refinement.trials), "67"),
         ("refined, median position", _millimetres(after.translation_m.median), "76 mm"),
         ("refined, median angle", _text(after.rotation_deg.median, "{:.2f}°"), "3.0°"),
-        ("refined within 5 cm and 2°", _percent(refinement.within_5cm_2deg), "–"),
-        ("fused surface, median error", _millimetres(summary.surface.error_median_m), "–"),
-        ("fused surface, completeness", _percent(summary.surface.completeness), "–"),
-        ("times real time", _text(summary.real_time_factor, "{:.2f}"), "1 (GPU)"),
+        ("refined within 5 cm and 2°", _percent(refinement.within_5cm_2deg), "-"),
+        ("fused surface, median error", _millimetres(summary.surface.error_median_m), "-"),
+        ("fused surface, completeness", _percent(summary.surface.completeness), "-"),
+        ("recorded s / processing s", _text(summary.real_time_factor, "{:.2f}"), "real time"),
     ]
     return rows
 
 
 def _text(value: float | None, form: str) -> str:
-    return "–" if value is None else form.format(value)
+    return "-" if value is None else form.format(value)
 
 
 def _percent(value: float | None) -> str:
-    return "–" if value is None else f"{100 * value:.1f} %"
+    return "-" if value is None else f"{100 * value:.1f} %"
 
 
 def _millimetres(value: float | None) -> str:
-    return "–" if value is None else f"{1e3 * value:.1f} mm"
+    return "-" if value is None else f"{1e3 * value:.1f} mm"

@@ -48,13 +48,14 @@ class Showcase:
         scene: Which one.
         condition: How it was made, for captions.
         depth_maps: Some of the depth maps that went into `surface`, the reference first.
-        depth_errors: For each of them (height, width) [m], the distance of every point to
-            the true surface, NaN where there is no depth.
+        depth_errors: For each of them (height, width) float32 [m], depth minus true depth,
+            NaN where either is missing.
         surface: The surface fused from them.
-        surface_error: (height, width) [m], the same for the fused surface.
-        aerial_heights, ground_heights: Height maps of the first localization step, as in
-            `HeightMapsMade`: the aerial one lies around the reference camera, along the
-            axes of `ground`, so that adding u to its origin puts it on the ground map.
+        surface_error: (height, width) float32 [m], the same for the fused depth.
+        aerial_heights, ground_heights: Height maps of the first localization step.
+        aerial_reference: (2,) the reference camera in the frame of `aerial_heights` [m].
+        aerial_heading: Turn from that frame to `ground` [rad]. Both are zero for the maps of
+            `HeightMapsMade`.
         steps: Successive aerial maps; the first one's cost map is also Fig. 7c.
         ground_cloud: The ground robot's map, in `ground`.
         aerial_cloud: What the MAV added to it, in `ground`.
@@ -71,6 +72,8 @@ class Showcase:
     surface_error: NDArray
     aerial_heights: HeightMap
     ground_heights: HeightMap
+    aerial_reference: NDArray[np.float64]
+    aerial_heading: float
     steps: tuple[LocalizationStep, ...]
     ground_cloud: PointCloud
     aerial_cloud: PointCloud
@@ -90,6 +93,7 @@ class Showcase:
         for name, shape, dtype in (
             ("surface_error", self.surface.depth.shape, np.float32),
             ("mav_image", np.shape(self.mav_image), np.uint8),
+            ("aerial_reference", (2,), np.float64),
             ("ground_image", (None, None, 3), np.uint8),
         ):
             object.__setattr__(self, name, read_only(getattr(self, name), name, shape, dtype))
@@ -98,7 +102,8 @@ class Showcase:
         """Write `showcase.npz`, `ground.ply` and `aerial.ply` into `folder`."""
         folder.mkdir(parents=True, exist_ok=True)
         archive = Archive()
-        for name in ("scene", "condition", "surface_error", "mav_image", "ground_image"):
+        plain = ("scene", "condition", "surface_error", "aerial_reference", "aerial_heading")
+        for name in (*plain, "mav_image", "ground_image"):
             archive.put(name, getattr(self, name))
         for name in ("surface", "aerial_heights", "ground_heights", "mav_path", "ground_path"):
             archive.put(name, getattr(self, name))
@@ -124,7 +129,7 @@ class Showcase:
             raise InputError(f"{folder / 'showcase.npz'}: entry {error} is missing") from error
 
 
-def _clouds(folder: Path) -> dict[str, PointCloud]:
+def _clouds(folder: Path) -> dict[str, Any]:
     return {
         "ground_cloud": read_cloud(folder / "ground.ply"),
         "aerial_cloud": read_cloud(folder / "aerial.ply"),
@@ -135,6 +140,7 @@ def _fields(archive: Archive) -> dict[str, Any]:
     fields: dict[str, Any] = {
         "scene": archive.text("scene"),
         "condition": archive.text("condition"),
+        "aerial_heading": archive.number("aerial_heading"),
         "surface": archive.get("surface", AerialSurface),
         "aerial_heights": archive.get("aerial_heights", HeightMap),
         "ground_heights": archive.get("ground_heights", HeightMap),
@@ -143,10 +149,8 @@ def _fields(archive: Archive) -> dict[str, Any]:
         "depth_maps": archive.several("depth_maps", DepthMap),
         "steps": archive.several("steps", LocalizationStep),
     }
-    for name in ("surface_error", "mav_image", "ground_image"):
+    for name in ("surface_error", "aerial_reference", "mav_image", "ground_image"):
         fields[name] = archive.array(name)
     count = int(archive.number("depth_errors.count"))
     fields["depth_errors"] = tuple(archive.array(f"depth_errors.{i}") for i in range(count))
     return fields
-
-

@@ -51,7 +51,9 @@ class Archive:
 
     def several(self, name: str, kind: type[T]) -> tuple[T, ...]:
         """Rebuild a tuple that was stored as `name.0`, `name.1`, ... and `name.count`."""
-        return tuple(self.get(f"{name}.{i}", kind) for i in range(int(self.number(f"{name}.count"))))
+        return tuple(
+            self.get(f"{name}.{i}", kind) for i in range(int(self.number(f"{name}.count")))
+        )
 
     def _member(self, name: str, hint: Any) -> Any:
         if is_dataclass(hint):

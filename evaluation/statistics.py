@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+
 @dataclass(frozen=True)
 class Interval:
     """A value and where it may lie with 95 % confidence."""
@@ -69,9 +70,7 @@ def quantiles(values: ArrayLike) -> Quantiles:
     return Quantiles(*(quantile(values, q) for q in (0.5, 0.25, 0.75, 0.95)))
 
 
-def median_interval(
-    values: ArrayLike, rng: np.random.Generator, resamples: int = 2000
-) -> Interval:
+def median_interval(values: ArrayLike, rng: np.random.Generator, resamples: int = 2000) -> Interval:
     """The median with a 95 % percentile bootstrap interval.
 
     Values are taken as independent; trials on the same recording are not quite.

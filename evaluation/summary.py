@@ -22,7 +22,7 @@ from evaluation.results import Condition, ResultTable
 from evaluation.run_info import RunInfo
 from evaluation.statistics import quantiles, rate_within, wilson, with_failures
 
-SCHEMA = 1
+SCHEMA: Literal[1] = 1
 
 Share = Annotated[float, Field(ge=0, le=1)]
 Number = Annotated[float, Field(allow_inf_nan=False)] | None
@@ -132,7 +132,7 @@ class TimingTable(_Part):
 class Summary(_Part):
     """Everything `summary.json` holds (DESIGN.md, "What a run leaves")."""
 
-    schema_: Literal[1] = Field(SCHEMA, alias="schema")
+    schema_: Literal[1] = Field(alias="schema")
     version: str
     git_revision: str
     preset: Literal["paper", "best"]
@@ -178,6 +178,7 @@ def build_summary(table: ResultTable, condition: Condition, run: RunInfo) -> Sum
     if len(measured) == 0:
         raise InputError(f"results: nothing was measured with {condition.label()}")
     return Summary(
+        schema=SCHEMA,
         version=run.version,
         git_revision=run.git_revision,
         preset=condition.preset,  # type: ignore[arg-type]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,7 +25,12 @@ class BeforeAfter:
 
 @styled
 def before_after_figure(
-    trials: dict[str, BeforeAfter], title: str, paper: float, unit: str, floor: float
+    trials: dict[str, BeforeAfter],
+    title: str,
+    paper: float,
+    unit: str,
+    floor: float,
+    colours: Sequence[str] = SERIES,
 ) -> Figure:
     """One group of boxes before, one after; the paper's median after as a line.
 
@@ -34,6 +40,7 @@ def before_after_figure(
         paper: The paper's median after refinement, in the unit of the errors.
         unit: For the line's label.
         floor: Smallest value on the axis.
+        colours: One a condition.
     """
     figure = Figure(figsize=(4.6, 4.9), layout="constrained")
     axes = figure.subplots()
@@ -43,9 +50,9 @@ def before_after_figure(
     for group, (label, pair) in enumerate(trials.items()):
         offset, width = positions(len(trials), group, 0.7)
         for x, values in ((0, pair.before), (1, pair.after)):
-            draw_box(axes, x + offset, values, width, SERIES[group])
+            draw_box(axes, x + offset, values, width, colours[group])
             _write_median(axes, x + offset, values)
-        axes.plot([], [], color=SERIES[group], linewidth=6, alpha=0.6, label=label)
+        axes.plot([], [], color=colours[group], linewidth=6, alpha=0.6, label=label)
     axes.plot([0.55, 1.45], [paper, paper], color=PAPER, linewidth=1.6, linestyle=(0, (5, 3)))
     axes.text(1.52, paper, f"paper\n{paper:g} {unit}", color=PAPER, ha="left", va="center")
     axes.set_xlim(-0.5, 1.5)

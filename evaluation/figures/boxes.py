@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from evaluation.statistics import quantile, with_failures
 
@@ -87,3 +87,11 @@ def positions(groups: int, group: int, width: float = 0.8) -> tuple[float, float
     """Offset and width of one of several boxes that share an integer position."""
     step = width / groups
     return -width / 2 + step * (group + 0.5), step * 0.78
+
+
+def iteration_axis(axes: Axes, groups: list[NDArray[np.float64]]) -> None:
+    """A horizontal axis of iterations for arrays of (sequences, iterations)."""
+    last = max((group.shape[1] for group in groups), default=1)
+    axes.set_xlim(0.4, last + 0.6)
+    axes.set_xticks(range(1, last + 1))
+    axes.set_xlabel("iteration (aerial maps taken in)")

@@ -24,7 +24,7 @@ SHOWN = 3
 
 @styled
 def depth_maps_figure(showcase: Showcase) -> Figure:
-    """Reference view, single and fused depth above; error and its distribution below."""
+    """Depth above; below it the signed error, and on the left how its size is distributed."""
     columns = min(SHOWN, len(showcase.depth_maps)) + 2
     figure = Figure(figsize=(2.35 * columns, 4.15), layout="constrained")
     axes = figure.subplots(2, columns)
@@ -37,19 +37,20 @@ def depth_maps_figure(showcase: Showcase) -> Figure:
     axes[0, 0].set_title("reference view")
     picture_axes(axes[0, 0])
     low, high = np.nanpercentile(np.concatenate([d.ravel() for d in depths]), [1, 99])
+    depth_colours = colour_map(DEPTH_COLOURS, hole=FAINT)
     limit_mm = _robust_limit_mm(errors[-1])
     for column, (depth, error, title) in enumerate(zip(depths, errors, titles, strict=True), 1):
-        shown = axes[0, column].imshow(depth, cmap=colour_map(DEPTH_COLOURS), vmin=low, vmax=high)
+        shown = axes[0, column].imshow(depth, cmap=depth_colours, vmin=low, vmax=high)
         axes[0, column].set_title(title)
         wrong = axes[1, column].imshow(
-            1e3 * error, cmap=colour_map(ERROR_COLOURS), vmin=0, vmax=limit_mm
+            1e3 * error, cmap=colour_map(ERROR_COLOURS, hole=FAINT), vmin=-limit_mm, vmax=limit_mm
         )
         axes[1, column].set_title(_error_title(error), fontsize=9, fontweight="normal")
         picture_axes(axes[0, column])
         picture_axes(axes[1, column])
     figure.colorbar(shown, ax=axes[0, :], label="depth [m]", shrink=0.85, pad=0.01)
-    bar = figure.colorbar(wrong, ax=axes[1, 1:], extend="max", shrink=0.85, pad=0.01)
-    bar.set_label("distance to the\ntrue surface [mm]")
+    bar = figure.colorbar(wrong, ax=axes[1, 1:], extend="both", shrink=0.85, pad=0.01)
+    bar.set_label("depth minus true [mm]")
     _distribution(axes[1, 0], errors)
     return figure
 
@@ -60,7 +61,7 @@ def completeness(error: NDArray) -> float:
 
 
 def _error_title(error: NDArray) -> str:
-    size = 1e3 * error[np.isfinite(error)]
+    size = 1e3 * np.abs(error[np.isfinite(error)])
     if len(size) == 0:
         return "nothing seen"
     median, p90 = np.percentile(size, [50, 90])
@@ -68,7 +69,7 @@ def _error_title(error: NDArray) -> str:
 
 
 def _robust_limit_mm(error: NDArray) -> float:
-    size = 1e3 * error[np.isfinite(error)]
+    size = 1e3 * np.abs(error[np.isfinite(error)])
     wide = float(np.percentile(size, 95)) if len(size) else 20.0
     return float(np.clip(np.ceil(wide / 5) * 5, 10, 60))
 
@@ -92,5 +93,5 @@ def _distribution(axes: Axes, errors: list[NDArray]) -> None:
 
 
 def _share_within(error: NDArray, steps_mm: NDArray) -> NDArray:
-    ordered = np.sort(1e3 * error[np.isfinite(error)])
+    ordered = np.sort(1e3 * np.abs(error[np.isfinite(error)]))
     return 100 * np.searchsorted(ordered, steps_mm, side="right") / error.size

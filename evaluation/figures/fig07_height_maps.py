@@ -44,7 +44,7 @@ def height_maps_figure(showcase: Showcase) -> Figure:
 
     cost_map = step.cost_map
     shown = draw_costs(cost_axes, cost_map.costs, cost_map.origin, cost_map.cells_per_m)
-    units = {"zmssd": "ZMSSD [m²]", "ncc": "1 − correlation"}
+    units = {"zmssd": "ZMSSD [m²]", "ncc": "1 - correlation"}
     label = units.get(cost_map.cost, cost_map.cost)
     figure.colorbar(shown, ax=cost_axes, label=label, shrink=0.9, extend="max")
     cost_axes.set_title("c  cost of every position u")
@@ -73,6 +73,8 @@ def _footprint(axes: Axes, showcase: Showcase, u: NDArray) -> None:
     seen = np.pad(np.isfinite(aerial.heights), 2)
     seen = binary_fill_holes(binary_closing(seen, iterations=2))
     index = np.stack(np.meshgrid(*(np.arange(n) - 2 for n in seen.shape), indexing="ij"), axis=-1)
-    points = u + aerial.origin + index / aerial.cells_per_m
-    x, y = points[..., 0], points[..., 1]
+    points = aerial.origin + index / aerial.cells_per_m - showcase.aerial_reference
+    c, s = np.cos(showcase.aerial_heading), np.sin(showcase.aerial_heading)
+    x = u[0] + c * points[..., 0] - s * points[..., 1]
+    y = u[1] + s * points[..., 0] + c * points[..., 1]
     axes.contour(x, y, seen.astype(float), levels=[0.5], colors=[PAPER], linewidths=1.8)

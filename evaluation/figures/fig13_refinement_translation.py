@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from matplotlib.figure import Figure
 
 from evaluation import published
 from evaluation.figures.before_after import BeforeAfter, before_after_figure
+from evaluation.figures.style import SERIES
 
 
-def refinement_translation_figure(trials: dict[str, BeforeAfter]) -> Figure:
+def refinement_translation_figure(
+    trials: dict[str, BeforeAfter], colours: Sequence[str] = SERIES
+) -> Figure:
     """Label of a condition -> translation errors [m]; the paper's median is 0.076 m."""
     paper = published.REFINEMENT_TRANSLATION_M.value
-    return before_after_figure(trials, "translation error [m]", paper, "m", floor=5e-4)
+    return before_after_figure(
+        trials, "translation error [m]", paper, "m", floor=5e-4, colours=colours
+    )

@@ -14,7 +14,12 @@ from evaluation.figures.style import COST_COLOURS, colour_map
 
 
 def draw_grid(
-    axes: Axes, cells: NDArray, origin: NDArray, cells_per_m: float, cmap: str | Colormap, **limits: Any
+    axes: Axes,
+    cells: NDArray,
+    origin: NDArray,
+    cells_per_m: float,
+    cmap: str | Colormap,
+    **limits: Any,
 ) -> AxesImage:
     """Draw (nx, ny) cells so that x runs right and y up, both in metres."""
     half = 0.5 / cells_per_m

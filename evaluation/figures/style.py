@@ -21,7 +21,7 @@ HOLE = "#EFF0F2"
 
 HEIGHT_COLOURS = "viridis"
 DEPTH_COLOURS = "viridis_r"
-ERROR_COLOURS = "magma_r"
+ERROR_COLOURS = "RdBu_r"
 COST_COLOURS = LinearSegmentedColormap.from_list("cost", ["#000000", "#C4C8CE"])
 """Ends in grey, so that white lines stay visible on it."""
 
@@ -52,16 +52,16 @@ STYLE: dict[str, Any] = {
     "svg.hashsalt": "airground",
 }
 
-styled = mpl.rc_context(STYLE)
+styled = mpl.rc_context(STYLE)  # type: ignore[arg-type]
 """Decorator that gives a figure function this look."""
 
 PICTURE_DPI = 160
 
 
-def colour_map(colours: str | Colormap) -> Colormap:
-    """A colour map that shows NaN as `HOLE`."""
+def colour_map(colours: str | Colormap, hole: str = HOLE) -> Colormap:
+    """A colour map that shows NaN as `hole`."""
     named = mpl.colormaps[colours] if isinstance(colours, str) else colours
-    return named.with_extremes(bad=HOLE)
+    return named.with_extremes(bad=hole)
 
 
 def picture_axes(axes: Axes) -> None:

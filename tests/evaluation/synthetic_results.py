@@ -149,7 +149,7 @@ def make_showcase(seed: int = 0, scale: int = 1) -> Showcase:
     def noisy(depth: np.ndarray, sigma: float, holes: float) -> tuple[np.ndarray, np.ndarray]:
         error = rng.normal(0, sigma, depth.shape) + 0.1 * (rng.random(depth.shape) < 0.03)
         error[rng.random(depth.shape) < holes] = np.nan
-        return (depth + error).astype(np.float32), np.abs(error)
+        return (depth + error).astype(np.float32), error.astype(np.float32)
 
     eyes = [np.array([0.1 * i, 0.05 * i, 2.2]) for i in range(4)]
     texture = (110 + 60 * rng.random((height, width))).astype(np.uint8)
@@ -175,6 +175,8 @@ def make_showcase(seed: int = 0, scale: int = 1) -> Showcase:
         surface_error=surface_error,
         aerial_heights=aerial_heights,
         ground_heights=ground_heights,
+        aerial_reference=np.zeros(2),
+        aerial_heading=0.0,
         steps=steps,
         ground_cloud=_ground_cloud(rng, 40000 // scale**2),
         aerial_cloud=aerial,
