@@ -28,7 +28,6 @@ GROUND_PATH = (34, 94, 214)
 MAV_PATH = (20, 158, 78)
 BACKGROUND = (250, 250, 248)
 
-SUPERSAMPLING = 2
 FIELD_OF_VIEW = np.radians(52.0)
 MARKER_M = 0.22
 PATH_RADIUS_M = 0.012
@@ -84,7 +83,7 @@ def aerial_viewpoint(showcase: Showcase, aspect: float = 1.5) -> Viewpoint:
 
 
 def render_augmented_map(
-    showcase: Showcase, view: Viewpoint, size: tuple[int, int] = (960, 640)
+    showcase: Showcase, view: Viewpoint, size: tuple[int, int] = (1440, 960)
 ) -> NDArray[np.uint8]:
     """Draw both clouds, both paths and the cameras.
 
@@ -119,15 +118,12 @@ def render_augmented_map(
         scene.add(_tubes(edges, 0.8 * PATH_RADIUS_M, colour))
     scene.add(pyrender.PerspectiveCamera(yfov=FIELD_OF_VIEW, znear=0.1, zfar=60.0), pose=pose)
 
-    width, height = (n * SUPERSAMPLING for n in size)
-    renderer = pyrender.OffscreenRenderer(width, height)
+    renderer = pyrender.OffscreenRenderer(*size)
     try:
         colour_image, depth = renderer.render(scene)
     finally:
         renderer.delete()
-    shaded = _eye_dome_lighting(colour_image, depth)
-    blocks = shaded.reshape(size[1], SUPERSAMPLING, size[0], SUPERSAMPLING, 3)
-    return blocks.mean(axis=(1, 3)).round().astype(np.uint8)
+    return _eye_dome_lighting(colour_image, depth)
 
 
 def _centre(cloud: PointCloud) -> NDArray[np.float64]:
@@ -234,7 +230,7 @@ def _mesh(
 
 def _eye_dome_lighting(
     colours: NDArray[np.uint8], depth: NDArray[np.float32], strength: float = 9.0
-) -> NDArray:
+) -> NDArray[np.uint8]:
     """Darken pixels behind a nearer neighbour, at two scales.
 
     Args:
@@ -243,9 +239,9 @@ def _eye_dome_lighting(
     """
     far = np.log(np.where(depth > 0, depth, 60.0)).astype(np.float32)
     darkness = np.zeros_like(far)
-    for radius in (2, 5):
+    for radius in (1, 4):
         for dy, dx in ((0, radius), (0, -radius), (radius, 0), (-radius, 0)):
             nearer = far - np.roll(far, (dy, dx), axis=(0, 1))
             darkness += np.clip(nearer, 0, 0.12)
     shade = np.where(depth > 0, np.exp(-strength * darkness / 4), 1.0)
-    return colours * shade[..., None]
+    return (colours * shade[..., None]).round().astype(np.uint8)

@@ -18,7 +18,7 @@ def views_figure(mav_image: NDArray[np.uint8], ground_image: NDArray[np.uint8]) 
     panels = figure.subplots(1, 2, width_ratios=aspects)
     titles = ("from the MAV, looking down", "from the ground robot")
     for axes, image, title in zip(panels, (mav_image, ground_image), titles, strict=True):
-        axes.imshow(image, cmap="gray", vmin=0, vmax=255, interpolation="lanczos")
+        axes.imshow(image, cmap="gray", vmin=0, vmax=255)
         axes.set_title(title)
         picture_axes(axes)
     return figure

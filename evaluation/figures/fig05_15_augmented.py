@@ -20,7 +20,7 @@ def augmented_figure(robot_view: NDArray[np.uint8], aerial_view: NDArray[np.uint
     for axes, picture, title in zip(
         figure.subplots(1, 2), (robot_view, aerial_view), titles, strict=True
     ):
-        axes.imshow(picture, interpolation="lanczos")
+        axes.imshow(picture)
         axes.set_title(title)
         picture_axes(axes)
     figure.legend(handles=_legend(), loc="outside lower center", ncols=4)

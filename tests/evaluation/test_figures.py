@@ -1,0 +1,124 @@
+"""Figures show what the data says: failures, medians, orientation, true colours."""
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from evaluation.figures.before_after import BeforeAfter
+from evaluation.figures.boxes import draw_box, log_axis
+from evaluation.figures.fig06_depth_maps import completeness, depth_maps_figure
+from evaluation.figures.fig07_height_maps import height_maps_figure
+from evaluation.figures.fig08_particles import covariance_ellipse, particles_figure
+from evaluation.figures.fig11_localization_error import localization_error_figure
+from evaluation.figures.fig13_refinement_translation import refinement_translation_figure
+from evaluation.figures.maps import draw_grid
+from evaluation.figures.style import save_figure
+from evaluation.figures.table1_timing import timing_figure
+from evaluation.showcase import Showcase
+from tests.evaluation.synthetic_results import make_showcase
+
+
+@pytest.fixture(scope="module")
+def showcase() -> Showcase:
+    return make_showcase(scale=4)
+
+
+def _texts(figure: Figure) -> list[str]:
+    from matplotlib.text import Text
+
+    return [text.get_text() for text in figure.findobj(Text) if isinstance(text, Text)]
+
+
+def test_failures_are_counted_above_a_box() -> None:
+    figure = Figure()
+    axes = figure.subplots()
+    log_axis(axes, [[0.1, 0.2, np.nan, np.inf]], floor=1e-3)
+    draw_box(axes, 1.0, [0.1, 0.2, np.nan, np.inf], 0.5, "black")
+    assert "2✕" in _texts(figure)
+
+
+def test_a_box_that_failures_reach_ends_at_the_top_of_the_axis() -> None:
+    axes = Figure().subplots()
+    values = [0.1, 0.2, np.nan, np.nan]
+    log_axis(axes, [values], floor=1e-3)
+    draw_box(axes, 1.0, values, 0.5, "black")
+    outline = axes.lines[0].get_ydata()
+    assert np.max(outline) == pytest.approx(axes.get_ylim()[1])
+
+
+def test_every_outlier_is_drawn() -> None:
+    axes = Figure().subplots()
+    values = np.append(np.linspace(0.1, 0.11, 30), [5.0, 7.0])
+    log_axis(axes, [values], floor=1e-3)
+    draw_box(axes, 1.0, values, 0.5, "black")
+    np.testing.assert_array_equal(np.sort(axes.lines[-1].get_ydata()), [5.0, 7.0])
+
+
+def test_all_failed_still_draws() -> None:
+    figure = localization_error_figure({"lost": np.full((3, 12), np.nan)})
+    assert _texts(figure).count("3✕") == 12
+
+
+def test_fig11_shows_the_papers_two_points() -> None:
+    figure = localization_error_figure({"a": np.full((4, 12), 0.1)})
+    assert {"paper 65%", "paper 89%"} <= set(_texts(figure))
+
+
+def test_fig13_writes_medians_and_the_papers() -> None:
+    figure = refinement_translation_figure({"a": BeforeAfter([0.3, 0.31, 0.32], [0.004, 0.003])})
+    assert {"0.31", "0.0035", "paper\n0.076 m"} <= set(_texts(figure))
+
+
+def test_timing_says_what_was_not_run() -> None:
+    figure = timing_figure({"icp": np.array([100.0, 120.0])})
+    texts = _texts(figure)
+    assert "ICP alignment" in texts
+    assert texts.count("not run") == 8
+    assert "Height maps" not in texts
+
+
+def test_grids_are_drawn_with_x_right_and_y_up() -> None:
+    axes = Figure().subplots()
+    cells = np.zeros((3, 2))
+    cells[2, 0] = 1.0
+    shown = draw_grid(axes, cells, np.array([1.0, 5.0]), 10.0, "gray")
+    assert shown.get_array().shape == (2, 3)
+    assert shown.get_array()[0, 2] == 1.0
+    assert shown.origin == "lower"
+    np.testing.assert_allclose(shown.get_extent(), [0.95, 1.25, 4.95, 5.15])
+
+
+@pytest.mark.parametrize("angle", [0.3, -1.1, 2.0])
+def test_the_ellipse_follows_the_covariance(angle: float) -> None:
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    covariance = turn @ np.diag([0.04, 0.01]) @ turn.T
+    ellipse = covariance_ellipse(np.array([1.0, 2.0]), covariance)
+    corner = ellipse.get_patch_transform().transform([[0, 1]])[0] - [1.0, 2.0]
+    # The larger half axis is 2 sigma long and points along the larger eigenvector.
+    assert np.linalg.norm(corner) == pytest.approx(0.4)
+    assert abs(corner @ turn[:, 0]) == pytest.approx(0.4)
+
+
+def test_completeness_is_the_share_of_pixels_with_depth() -> None:
+    assert completeness(np.array([[0.1, np.nan], [np.nan, np.nan]])) == 0.25
+
+
+def test_pictures_of_a_flight_state_their_numbers(showcase: Showcase) -> None:
+    assert any("of pixels" in text for text in _texts(depth_maps_figure(showcase)))
+    assert "lowest cost" in _texts(height_maps_figure(showcase))
+    assert any("spread" in text for text in _texts(particles_figure(showcase.steps)))
+
+
+def test_the_same_figure_gives_the_same_bytes(tmp_path: Path) -> None:
+    def digests(folder: str) -> list[str]:
+        figure = refinement_translation_figure({"a": BeforeAfter([0.3, 0.2], [0.01, 0.02])})
+        save_figure(figure, tmp_path / folder, "f")
+        return [
+            hashlib.sha256((tmp_path / folder / f"f.{ending}").read_bytes()).hexdigest()
+            for ending in ("png", "pdf")
+        ]
+
+    assert digests("one") == digests("two")
