@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -13,6 +14,7 @@ from airground.errors import RecordingError
 from airground.io.calibration import CalibrationTable, Table
 
 SCHEMA = 1
+_NUMBERS = re.compile(r"\[\s+([-+.\deE,\s]+?)\s+\]")  # an array of numbers over many lines
 
 
 class FrameCounts(Table):
@@ -75,7 +77,9 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 def write_toml(path: Path, table: Table) -> None:
     """Write a table; the same values give the same bytes."""
-    path.write_text(tomli_w.dumps(table.model_dump(by_alias=True, mode="json")), encoding="utf-8")
+    text = tomli_w.dumps(table.model_dump(by_alias=True, mode="json"))
+    compact = _NUMBERS.sub(lambda match: f"[{' '.join(match[1].split()).rstrip(',')}]", text)
+    path.write_text(compact, encoding="utf-8")
 
 
 AnyTable = TypeVar("AnyTable", bound=Table)

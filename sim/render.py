@@ -1,0 +1,133 @@
+"""Pictures and exact depth of a world that stands still, from cameras anywhere in it.
+
+This is the one place where axes are converted: MuJoCo's cameras (OpenGL) look along -z with
+y up, ours (OpenCV) along +z with y down.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import TracebackType
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.camera import PinholeCamera
+from airground.core.se3 import SE3
+from airground.errors import AirgroundError
+
+_OPENCV_FROM_OPENGL = np.diag([1.0, -1.0, -1.0])
+
+
+class Renderer:
+    """Draws a world from named pinhole cameras, all in one graphics context.
+
+    A context manager; the context belongs to the thread that made it.
+
+    Args:
+        model: A world without joints, from `with_cameras`.
+
+    Raises:
+        AirgroundError: This machine cannot draw without a screen.
+    """
+
+    def __init__(self, model: mujoco.MjModel) -> None:
+        self._model = model
+        self._data = mujoco.MjData(self._model)
+        mujoco.mj_forward(self._model, self._data)
+        self._scene = mujoco.MjvScene(self._model, maxgeom=self._model.ngeom + 100)
+        self._option = mujoco.MjvOption()
+        visual = self._model.vis.global_
+        try:
+            self._window = mujoco.GLContext(visual.offwidth, visual.offheight)
+            self._window.make_current()
+        except Exception as error:  # each backend has its own kinds
+            raise AirgroundError(
+                f"cannot draw without a screen ({error}); `airground doctor` says what is missing"
+            ) from error
+        self._context = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
+        self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
+
+    def __enter__(self) -> Renderer:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the graphics context."""
+        self._context.free()
+        self._window.free()
+
+    def colour(self, camera: str, T_world_camera: SE3) -> NDArray[np.uint8]:
+        """(height, width, 3) uint8 RGB, antialiased."""
+        rect = self._draw(camera, T_world_camera)
+        image = np.empty((rect.height, rect.width, 3), np.uint8)
+        mujoco.mjr_readPixels(image, None, rect, self._context)
+        return np.ascontiguousarray(image[::-1])
+
+    def depth(self, camera: str, T_world_camera: SE3) -> NDArray[np.float32]:
+        """(height, width) float32 [m] along the optical axis, NaN where there is nothing.
+
+        Drawn without antialiasing, which would move the samples off the pixel centres.
+        """
+        flags = self._scene.flags.copy()
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = True
+        self._scene.flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = True
+        rect = self._draw(camera, T_world_camera)
+        self._scene.flags[:] = flags
+        stored = np.empty((rect.height, rect.width), np.float32)
+        mujoco.mjr_readPixels(None, stored, rect, self._context)
+        return self._metric(stored[::-1])
+
+    def _draw(self, camera: str, T_world_camera: SE3) -> mujoco.MjrRect:
+        index = self._model.camera(camera).id
+        self._data.cam_xpos[index] = T_world_camera.translation
+        self._data.cam_xmat[index] = (T_world_camera.rotation @ _OPENCV_FROM_OPENGL).ravel()
+        view = mujoco.MjvCamera()
+        view.type = mujoco.mjtCamera.mjCAMERA_FIXED
+        view.fixedcamid = index
+        everything = mujoco.mjtCatBit.mjCAT_ALL.value
+        mujoco.mjv_updateScene(
+            self._model, self._data, self._option, None, view, everything, self._scene
+        )
+        width, height = (int(side) for side in self._model.cam_resolution[index])
+        rect = mujoco.MjrRect(0, 0, width, height)
+        self._window.make_current()
+        mujoco.mjr_render(rect, self._scene, self._context)
+        return rect
+
+    def _metric(self, stored: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Undo the perspective of the depth buffer, which is 0 at the far plane."""
+        near = np.float32(self._model.vis.map.znear * self._model.stat.extent)
+        far = np.float32(self._model.vis.map.zfar * self._model.stat.extent)
+        depth = (far * near / (far - near)) / (stored + near / (far - near))
+        depth[stored == 0] = np.nan
+        return depth
+
+
+def with_cameras(spec: mujoco.MjSpec, cameras: Mapping[str, PinholeCamera]) -> mujoco.MjModel:
+    """Compile a world (left as it is) with cameras of exact intrinsics, by name."""
+    spec = spec.copy()
+    for name, camera in cameras.items():
+        spec.worldbody.add_camera(
+            name=name,
+            resolution=[camera.width, camera.height],
+            sensor_size=[camera.width * 1e-3, camera.height * 1e-3],  # only the aspect counts
+            focal_pixel=[camera.fx, camera.fy],
+            principal_pixel=[
+                camera.width / 2 - 0.5 - camera.cx,
+                camera.height / 2 - 0.5 - camera.cy,
+            ],
+        )
+    visual = spec.visual.global_
+    visual.offwidth = max(visual.offwidth, *(c.width for c in cameras.values()))
+    visual.offheight = max(visual.offheight, *(c.height for c in cameras.values()))
+    return spec.compile()

@@ -1,0 +1,1 @@
+"""What real sensors add to what perfect ones would say."""

@@ -1,0 +1,124 @@
+"""What is true of the sensors, and the slightly wrong values that the pipeline is told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from airground.core.se3 import SE3
+from airground.io.calibration import (
+    CalibrationTable,
+    CameraTable,
+    DepthTable,
+    GroundTable,
+    ImuTable,
+    MagnetometerTable,
+    RobotTable,
+    pose_rows,
+)
+from sim.presets import ADIS16448, NOMINAL, CalibrationErrors, ImuNoise, SensorPreset
+from sim.robot_motion import Mounting
+
+CAMERA_RATE_HZ = 30.0
+IMU_RATE_HZ = 200.0
+MAGNETOMETER_RATE_HZ = 50.0
+MAV_IMAGE_PX = (752, 480)
+GROUND_IMAGE_PX = (640, 480)
+GROUND_FOCAL_PX = 525.0
+DEPTH_UNITS_PER_M = 5000.0
+
+
+@dataclass(frozen=True)
+class Calibrations:
+    """Attributes: `true` is how the sensors are, `told` what the recording says."""
+
+    true: CalibrationTable
+    told: CalibrationTable
+
+
+def calibrate(
+    mav_focal_px: float,
+    mav: Mounting,
+    ground: Mounting,
+    preset: SensorPreset,
+    rng: np.random.Generator,
+) -> Calibrations:
+    """Draw the errors of a preset.
+
+    The cameras are as the scene says and the pipeline is told another focal length and
+    mounting; clocks and depth scale are told as they should be, and really are another.
+
+    Args:
+        mav_focal_px: True focal length of the MAV's camera [px].
+        mav, ground: True places of the sensors.
+        preset: Gives the size of the errors, and the noise that data sheets state.
+        rng: Source of signs and directions.
+    """
+    errors = preset.calibration or CalibrationErrors(0.0, 0.0, 0, 0.0)
+    signs = rng.choice([-1.0, 1.0], 5)
+    imu, magnetometer = _imu_table(preset.imu), _magnetometer_table(preset)
+    tables = []
+    for mounting, size, focal, sign, clock in (
+        (mav, MAV_IMAGE_PX, mav_focal_px, signs[0], signs[1]),
+        (ground, GROUND_IMAGE_PX, GROUND_FOCAL_PX, signs[2], signs[3]),
+    ):
+        offset_ns = int(clock * errors.time_offset_ns)
+        axis = rng.standard_normal(3)
+        turn = SE3.from_rotation_vector(errors.camera_to_imu * axis / np.linalg.norm(axis))
+        true, told = (
+            RobotTable(
+                T_body_imu=pose_rows(mounting.T_body_imu),
+                T_imu_camera=pose_rows(T_imu_camera),
+                camera=_camera(size, focal_px, time_offset_ns),
+                imu=imu,
+                magnetometer=magnetometer,
+            )
+            for T_imu_camera, focal_px, time_offset_ns in (
+                (mounting.T_imu_camera, focal, offset_ns),
+                (mounting.T_imu_camera @ turn, focal * (1 + sign * errors.focal), 0),
+            )
+        )
+        tables.append((true, told))
+    scale = 1 + signs[4] * errors.depth_scale
+    (mav_true, mav_told), (ground_true, ground_told) = tables
+    return Calibrations(
+        CalibrationTable(mav=mav_true, ground=_with_depth(ground_true, DEPTH_UNITS_PER_M * scale)),
+        CalibrationTable(mav=mav_told, ground=_with_depth(ground_told, DEPTH_UNITS_PER_M)),
+    )
+
+
+def _camera(size: tuple[int, int], focal_px: float, time_offset_ns: int) -> CameraTable:
+    width, height = size
+    return CameraTable(
+        width=width,
+        height=height,
+        fx=focal_px,
+        fy=focal_px,
+        cx=(width - 1) / 2,
+        cy=(height - 1) / 2,
+        rate_hz=CAMERA_RATE_HZ,
+        time_offset_ns=time_offset_ns,
+    )
+
+
+def _with_depth(robot: RobotTable, units_per_m: float) -> GroundTable:
+    return GroundTable(**dict(robot), depth=DepthTable(units_per_m=units_per_m))
+
+
+def _imu_table(noise: ImuNoise | None) -> ImuTable:
+    """A perfect sensor is told as the usual one: filters need some noise."""
+    noise = noise or ADIS16448
+    return ImuTable(
+        rate_hz=IMU_RATE_HZ,
+        gyro_noise_density=noise.gyro_density,
+        gyro_bias_walk=noise.gyro_walk,
+        accelerometer_noise_density=noise.accelerometer_density,
+        accelerometer_bias_walk=noise.accelerometer_walk,
+    )
+
+
+def _magnetometer_table(preset: SensorPreset) -> MagnetometerTable:
+    noise = preset.magnetic or NOMINAL.magnetic
+    assert noise is not None
+    return MagnetometerTable(rate_hz=MAGNETOMETER_RATE_HZ, noise_t=noise.noise_t)
