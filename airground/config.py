@@ -87,16 +87,18 @@ class Fusion(Section):
 class GroundMapping(Section):
     """The ground robot's map from RGB-D frames and poses (Sec. IV)."""
 
-    keyframe_distance_m: Positive = 0.10
+    keyframe_distance_m: Positive = 0.05
     """A frame joins the map once the camera moved this far [m] ..."""
-    keyframe_angle_deg: Positive = 5.0
+    keyframe_angle_deg: Positive = 3.0
     """... or turned this far [deg]."""
     max_depth_m: Positive = 4.0
     """Depth beyond this is too noisy to keep [m]."""
     voxel_m: Positive = 0.02
-    """Points of the map are averaged over cubes of this side [m]."""
-    min_points: Count = 4
-    """Cubes that fewer depth pixels than this fell into are noise."""
+    """Side of a voxel of the distance field, and of the augmented map [m]."""
+    truncation_m: Positive = 0.08
+    """The distance field ends this far from the surface [m]."""
+    min_keyframes: Count = 3
+    """A surface that fewer keyframes saw is noise."""
 
 
 class HeightMaps(Section):

@@ -1,8 +1,14 @@
-"""The ground robot's map from RGB-D frames and their poses (Sec. IV)."""
+"""The ground robot's map from RGB-D frames and their poses (Sec. IV).
+
+Keyframes are fused in a truncated signed distance field, which averages the sensor's noise
+along its rays. Averaging points in cubes does not: at 4 m the noise of structured light is
+wider than a cube, and the highest of scattered points would enter the height map.
+"""
 
 from __future__ import annotations
 
 import numpy as np
+import open3d as o3d
 from numpy.typing import NDArray
 
 from airground.config import GroundMapping
@@ -10,11 +16,13 @@ from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
 from airground.core.messages import GroundImage
 from airground.core.se3 import SE3
-from airground.core.voxel_map import VoxelMap
+
+_BLOCK = 8
+_FIRST_BLOCKS = 10_000
 
 
 class GroundMap:
-    """Keyframes' depth images, averaged over small cubes in the frame `ground`.
+    """Keyframes' depth images, fused in the frame `ground`.
 
     Args:
         camera: The RGB-D camera, as calibrated.
@@ -23,10 +31,16 @@ class GroundMap:
 
     def __init__(self, camera: PinholeCamera, config: GroundMapping) -> None:
         self.keyframes = 0
-        self._camera = camera
-        self._rays = camera.rays().astype(np.float32)
         self._config = config
-        self._voxels = VoxelMap(config.voxel_m)
+        self._intrinsics = o3d.core.Tensor(camera.matrix())
+        self._grid = o3d.t.geometry.VoxelBlockGrid(
+            attr_names=("tsdf", "weight", "color"),
+            attr_dtypes=(o3d.core.float32,) * 3,
+            attr_channels=((1), (1), (3)),
+            voxel_size=config.voxel_m,
+            block_resolution=_BLOCK,
+            block_count=_FIRST_BLOCKS,
+        )
         self._T_ground_keyframe: SE3 | None = None
         self._cloud: PointCloud | None = None
 
@@ -42,26 +56,38 @@ class GroundMap:
 
     def add(self, image: GroundImage, T_ground_camera: SE3) -> None:
         """Take in a keyframe."""
-        points_camera, colours, depth = self._points(image)
-        # The noise of structured light grows with the square of depth (Nguyen et al. 2012).
-        self._voxels.add(T_ground_camera @ points_camera, colours, depth**-4.0)
+        usable = np.where(_near_silhouette(image.depth), np.nan, image.depth)
+        depth = o3d.t.geometry.Image(o3d.core.Tensor(np.nan_to_num(usable)))
+        colour = o3d.t.geometry.Image(o3d.core.Tensor(image.colour.astype(np.float32)))
+        T_camera_ground = o3d.core.Tensor(T_ground_camera.inverse().matrix())
+        reach = (1.0, self._config.max_depth_m, self._config.truncation_m / self._config.voxel_m)
+        blocks = self._grid.compute_unique_block_coordinates(
+            depth, self._intrinsics, T_camera_ground, *reach
+        )
+        self._grid.integrate(blocks, depth, colour, self._intrinsics, T_camera_ground, *reach)
         self._T_ground_keyframe = T_ground_camera
         self.keyframes += 1
         self._cloud = None
 
     def cloud(self) -> PointCloud:
-        """The map so far, one point a cube, in the frame `ground`."""
+        """The surface so far, with normals, in the frame `ground`."""
         if self._cloud is None:
-            self._cloud = self._voxels.cloud(self._config.min_points)
+            self._cloud = self._extracted()
         return self._cloud
 
-    def _points(self, image: GroundImage) -> tuple[NDArray, NDArray, NDArray]:
-        """Points (N, 3) in the camera, colours (N, 3) and depths (N,) [m] worth keeping."""
-        depth = image.depth
-        # NaN compares false, so missing depth drops out here.
-        keep = (depth <= self._config.max_depth_m) & ~_near_silhouette(depth)
-        points_camera = self._rays[keep] * depth[keep][:, None]
-        return points_camera, image.colour[keep], depth[keep]
+    def _extracted(self) -> PointCloud:
+        if self.keyframes == 0:
+            return PointCloud.empty()
+        extracted = self._grid.extract_point_cloud(self._config.min_keyframes - 0.5)
+        if extracted.is_empty():
+            return PointCloud.empty()
+        points = extracted.point.positions.numpy()
+        # Blocks come in the order of a parallel hash map, another each time.
+        order = np.lexsort(points.T)
+        colours = np.rint(extracted.point.colors.numpy()[order]).clip(0, 255)
+        return PointCloud(
+            points[order], colours.astype(np.uint8), extracted.point.normals.numpy()[order]
+        )
 
 
 def _near_silhouette(depth: NDArray[np.float32]) -> NDArray[np.bool_]:
