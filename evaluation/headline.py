@@ -111,5 +111,5 @@ def _share(made: Rate) -> str:
 def _sure(made: Rate, what: str) -> str:
     return (
         f"{made.successes} of {made.total} {what}; "
-        f"95 %: {100 * made.low:.0f} to {100 * made.high:.0f} %"
+        f"95 %: {100 * made.low:.0f} to {100 * made.high:.0f}\u00a0%"
     )

@@ -175,7 +175,7 @@ def _surface(table: ResultTable) -> str:
     if np.isnan(median):
         return MISSING
     p90 = quantile(table.values("surface", "error_p90_m"), 0.5)
-    return f"{metres(median)}\n90 % of points: {metres(p90)}"
+    return f"{metres(median)}\n90 %: {metres(p90)}"
 
 
 def _median_of(

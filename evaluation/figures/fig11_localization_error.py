@@ -76,7 +76,8 @@ def _success(
     axes.plot(at, 100 * paper, "D", color=PAPER, markersize=7, zorder=5, clip_on=False)
     axes.annotate(
         f"paper {paper:.0%}", (at, 100 * paper), xytext=(8, -4), textcoords="offset points",
-        color=PAPER, va="top", fontsize=9,
+        color=PAPER, va="top", fontsize=9, zorder=6,
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
     )  # fmt: skip
     axes.set_ylim(0, 103)
     axes.set_title(f"% of sequences within {limit:g} m")
