@@ -137,12 +137,16 @@ class Localization(Section):
     """Report the mean of all particles, or of those around the densest place."""
     redrawn_fraction: Fraction = 0.1
     """Share of the particles drawn anew from the current cost map at each update."""
+    min_mode_share: Fraction = 0.6
+    """With `mode`, at least this share of the particles must be there ..."""
     converged_spread_m: Positive = 0.15
-    """The belief has converged when the particles' standard deviation falls below this [m]."""
-    max_cost: Positive = 0.5
-    """A converged belief is refused when its cost exceeds this (ncc: correlation below 0.5)."""
+    """... and their standard deviation (with `mean`, that of all) must fall below this [m]."""
     min_relief_m: Positive = 0.03
     """Heights that deviate less than this over the overlap carry no structure [m]."""
+    min_correlation: Fraction = 0.4
+    """A belief is refused when heights at its estimate correlate less than this."""
+    min_agreement: Fraction = 0.2
+    """... or agree by less than this beyond chance (Cohen's kappa, core/agreement.py)."""
 
 
 class Refinement(Section):
@@ -167,7 +171,9 @@ class Refinement(Section):
     iterations: Count = 30
     """Most ICP steps in all."""
     min_inliers: Fraction = 0.35
-    """An alignment is refused when fewer aerial points than this lie on the ground map."""
+    """An alignment is refused when fewer aerial points than this lie on the ground map ..."""
+    min_agreement: Fraction = 0.2
+    """... or when they agree with it by less than this beyond chance (core/agreement.py)."""
 
 
 class Config(Section):
@@ -197,7 +203,6 @@ def paper() -> Config:
             min_overlap=0.5,
             estimate="mean",
             redrawn_fraction=0.0,
-            max_cost=1.0,
         ),
         refinement=Refinement(local_search=False, level_prior=False),
     )

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.config import Config
+from airground.core.agreement import agreement
 from airground.core.belief import Belief, HeightMap
 from airground.core.events import BeliefUpdated, CostMapComputed, Event, HeightMapsMade
+from airground.core.height_map import make_height_map
 from airground.core.se3 import SE3
 from airground.errors import InputError
 from airground.localization.acceptance import why_refused
@@ -86,7 +88,9 @@ class MonteCarloLocalizer:
             weight = weights(self._overlay(aerial, ground, moved).costs(self._local), self._sigma)
             particles = moved[resample(weight, self._rng)]
 
-        self.belief = self._summarize(stamp_ns, particles, position_mav, aerial, ground)
+        self.belief = self._summarize(
+            stamp_ns, particles, np.asarray(points_mav), position_mav, aerial, ground
+        )
         if volume is None or volume.feasible or self._particles is not None:
             # Else nothing overlapped yet, and the next surface is the first one again.
             self._particles = self._redraw(particles, volume)
@@ -154,7 +158,7 @@ class MonteCarloLocalizer:
 
         They join after the belief was summarized: the next aerial map judges them first.
         """
-        count = int(round(self._local.redrawn_fraction * len(particles)))
+        count = round(self._local.redrawn_fraction * len(particles))
         if volume is None or not volume.feasible or count == 0:
             return particles
         kept = self._rng.permutation(len(particles))[count:]
@@ -164,6 +168,7 @@ class MonteCarloLocalizer:
         self,
         stamp_ns: int,
         particles: NDArray,
+        points_mav: NDArray,
         position_mav: NDArray,
         aerial: HeightMap,
         ground: HeightMap,
@@ -172,23 +177,27 @@ class MonteCarloLocalizer:
         if self._local.estimate == "mode":
             counted = particles[densest_mode(particles)]
         estimate = mean_pose(counted)
-        covariance = np.cov(particles[:, :2].T)
         overlay = self._overlay(aerial, ground, estimate[None])
-        spread_m = float(np.sqrt(np.trace(covariance)))
-        refusal = why_refused(overlay, spread_m, self._local)
         offset = float(overlay.height_offsets()[0])
-        height = position_mav[2] + (offset if np.isfinite(offset) else 0.0)
-        turned = SE3.from_heading(estimate[2])
-        translation = np.array([*estimate[:2], height]) - turned @ position_mav
-        translation[2] = height - position_mav[2]
+        T_ground_mav = _motion(estimate, position_mav, offset)
+        laid = make_height_map(T_ground_mav @ points_mav, ground.cells_per_m)
+        refusal = why_refused(overlay, agreement(laid, ground), particles, self._local)
         return Belief(
             stamp_ns=stamp_ns,
             particles=particles,
             estimate=estimate,
-            covariance=covariance,
+            covariance=np.cov(particles[:, :2].T),
             cost=float(overlay.costs(self._local)[0]),
             height_offset=offset,
-            T_ground_mav=SE3(turned.rotation, translation),
+            T_ground_mav=T_ground_mav,
             converged=not refusal,
             refusal=refusal,
         )
+
+
+def _motion(estimate: NDArray, position_mav: NDArray, height_offset: float) -> SE3:
+    """T_ground_mav that brings the camera at `position_mav` to the estimate (x, y, heading)."""
+    turned = SE3.from_heading(estimate[2])
+    translation = np.array([*estimate[:2], 0.0]) - turned @ position_mav
+    translation[2] = height_offset if np.isfinite(height_offset) else 0.0
+    return SE3(turned.rotation, translation)

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.config import Config, Refinement
-from airground.core.belief import Alignment
+from airground.core.agreement import agreement
+from airground.core.belief import Alignment, HeightMap
 from airground.core.cloud import PointCloud
 from airground.core.height_map import lattice_index, make_height_map
 from airground.core.se3 import SE3
@@ -49,8 +50,10 @@ def refine(
         return _refused(stamp_ns, T_ground_mav_start, refusal)
 
     # A better start than the guess: nearby, the height maps say where.
-    start = _levelled(T_ground_mav_start, aerial.points) if settings.level_prior else (
-        T_ground_mav_start
+    start = (
+        _levelled(T_ground_mav_start, aerial.points)
+        if settings.level_prior
+        else (T_ground_mav_start)
     )
     source = make_surfels(aerial.points, settings.voxel_m)
     if settings.local_search:
@@ -94,7 +97,8 @@ def _judged(
     index, squared = target.nearest(moved)
     normals = target.normals[index]
     along = np.abs(((moved - target.points[index]) * normals).sum(axis=1))
-    covered = _covered(moved, target.points)
+    cover = make_height_map(target.points, COVER_CELLS_PER_M)
+    covered = _covered(moved, cover)
     inlier = covered & (squared < settings.final_distance_m**2)
     share = float(inlier.sum() / max(covered.sum(), 1))
     rmse_m = float(np.sqrt((along[inlier] ** 2).mean())) if inlier.any() else float("nan")
@@ -106,14 +110,19 @@ def _judged(
             f"only {share:.0%} of the aerial points over the ground map lie on it, "
             f"{settings.min_inliers:.0%} are needed"
         )
+    else:
+        agreed = agreement(make_height_map(moved, COVER_CELLS_PER_M), cover)
+        if agreed.kappa < settings.min_agreement:
+            refusal = (
+                f"heights agree over {agreed.share:.0%}, and over {agreed.chance:.0%} when "
+                "shifted: too little structure, or the wrong place"
+            )
     return Alignment(stamp_ns, motion, share, rmse_m, not refusal, refusal)
 
 
-def _covered(points: NDArray, ground: NDArray) -> NDArray[np.bool_]:
+def _covered(points: NDArray, cover: HeightMap) -> NDArray[np.bool_]:
     """(N,) which points are over cells that the ground robot saw something of."""
-    cover = make_height_map(ground, COVER_CELLS_PER_M)
-    cells = np.floor(points[:, :2] * COVER_CELLS_PER_M + 0.5).astype(int) - lattice_index(cover)
-    shape = cover.heights.shape
-    inside = ((cells >= 0) & (cells < shape)).all(axis=1)
+    cells = np.floor(points[:, :2] * cover.cells_per_m + 0.5).astype(int) - lattice_index(cover)
+    inside = ((cells >= 0) & (cells < cover.heights.shape)).all(axis=1)
     cells[~inside] = 0
     return inside & np.isfinite(cover.heights[cells[:, 0], cells[:, 1]])

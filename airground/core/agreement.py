@@ -1,0 +1,73 @@
+"""Whether two height maps agree by more than chance, wherever they were laid.
+
+Two heaps on a floor agree over half of their area whatever one does, since floor lies on
+floor; so the share of agreeing cells says little. What counts is how far it exceeds the
+share that the same maps reach in wrong places: Cohen's kappa, with chance measured by
+shifting. On flat ground, on a slope, along a ridge and in a regular pattern a shift does
+not matter, and kappa is near zero there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.belief import HeightMap
+from airground.core.height_map import lattice_index
+
+TOLERANCE_M = 0.05
+SHIFT_M = 0.4
+DIRECTIONS = 16
+MIN_CELLS = 50
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How well two overlaid height maps agree.
+
+    Attributes:
+        cells: Cells filled in both.
+        share: Of these, the share whose heights differ by at most 5 cm from the median
+            difference; 0 where too few overlap.
+        chance: Highest share at 16 places shifted by 0.4 m.
+    """
+
+    cells: int
+    share: float
+    chance: float
+
+    @property
+    def kappa(self) -> float:
+        """Agreement beyond chance: 1 is perfect, 0 is what any other place would give."""
+        return (self.share - self.chance) / max(1.0 - self.chance, 1e-6)
+
+
+def agreement(aerial: HeightMap, ground: HeightMap) -> Agreement:
+    """Compare two maps in one frame, on one lattice, and the same maps shifted apart."""
+    first = lattice_index(aerial) - lattice_index(ground)
+    angles = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    ring = SHIFT_M * aerial.cells_per_m * np.column_stack([np.cos(angles), np.sin(angles)])
+    cells, share = _agreeing(aerial.heights, ground.heights, first)
+    shifted = [
+        _agreeing(aerial.heights, ground.heights, first + s) for s in np.rint(ring).astype(int)
+    ]
+    # A shift that leaves less than half of the overlap is no fair comparison.
+    fair = [other for count, other in shifted if count >= cells / 2]
+    return Agreement(cells, share, max(fair, default=1.0))
+
+
+def _agreeing(aerial: NDArray, ground: NDArray, first: NDArray) -> tuple[int, float]:
+    """Overlapping cells and the share that agrees, with aerial [0, 0] at `first` in ground."""
+    low = np.maximum(-first, 0)
+    high = np.minimum(aerial.shape, np.array(ground.shape) - first)
+    if (low >= high).any():
+        return 0, 0.0
+    a = aerial[low[0] : high[0], low[1] : high[1]]
+    g = ground[low[0] + first[0] : high[0] + first[0], low[1] + first[1] : high[1] + first[1]]
+    difference = (g - a)[np.isfinite(a) & np.isfinite(g)]
+    if len(difference) < MIN_CELLS:
+        return len(difference), 0.0
+    near = np.abs(difference - np.median(difference)) < TOLERANCE_M
+    return len(difference), float(near.mean())
