@@ -162,7 +162,7 @@ def _tinted(colours: NDArray[np.uint8], tint: tuple[int, int, int] | None) -> ND
     grey = colours.astype(np.float32).mean(axis=1, keepdims=True)
     if tint is None:
         return np.repeat(grey, 3, axis=1).astype(np.uint8)
-    shade = 0.55 + 0.6 * grey / 255
+    shade = 0.35 + 0.85 * grey / 255
     return np.clip(shade * np.array(tint, np.float32), 0, 255).astype(np.uint8)
 
 
