@@ -73,6 +73,16 @@ class Renderer:
         mujoco.mjr_readPixels(image, None, rect, self._context)
         return np.ascontiguousarray(image[::-1])
 
+    def colour_and_rough_depth(
+        self, camera: str, T_world_camera: SE3
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """`colour`, and in the same drawing depth of some place within each pixel."""
+        rect = self._draw(camera, T_world_camera)
+        image = np.empty((rect.height, rect.width, 3), np.uint8)
+        stored = np.empty((rect.height, rect.width), np.float32)
+        mujoco.mjr_readPixels(image, stored, rect, self._context)
+        return np.ascontiguousarray(image[::-1]), self._metric(stored[::-1])
+
     def depth(self, camera: str, T_world_camera: SE3) -> NDArray[np.float32]:
         """(height, width) float32 [m] along the optical axis, NaN where there is nothing.
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from sim.presets import ImageNoise
+from sim.sensors.hashed_noise import gaussian, noise_key
 
 MAX_SAMPLES = 32
 _PERIODS_S = (2.5, 20.0)
@@ -89,11 +90,14 @@ class ImageSensor:
             (height, width, channels) uint8.
         """
         motion = pixel_motion(depth, self.camera, T_start_end)
-        draws = rng.standard_normal(sharp.shape, dtype=np.float32)
-        noise = self.noise
         gain = np.float32(self.drift.gain(time_s))
-        variances = np.array([noise.read_noise**2, noise.shot_noise], np.float32)
-        return _expose(sharp, motion, self.vignette, gain, variances, draws)
+        read, shot = np.float32(self.noise.read_noise**2), np.float32(self.noise.shot_noise)
+        image = np.empty_like(sharp)
+        for channel in range(sharp.shape[2]):
+            key = noise_key(rng)
+            plane = sharp[..., channel].astype(np.float32)
+            _expose(plane, motion, self.vignette, gain, read, shot, key, image[..., channel])
+        return image
 
 
 def pixel_motion(
@@ -136,30 +140,27 @@ def _pixel_motion(depth, intrinsics, twist):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _expose(sharp, motion, vignette, gain, variances, draws):  # type: ignore[no-untyped-def]
+def _expose(sharp, motion, vignette, gain, read, shot, key, image):  # type: ignore[no-untyped-def]
     """Average along each pixel's motion, then light losses, noise and rounding."""
-    height, width, channels = sharp.shape
-    image = np.empty_like(sharp)
-    light = np.zeros(channels, np.float32)
+    height, width = sharp.shape
+    zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
     last_x, last_y = np.float32(width - 1), np.float32(height - 1)
     for row in range(height):
         for column in range(width):
-            mx, my = motion[row, column]
-            samples = min(2 + int(np.ceil(max(abs(mx), abs(my)))), MAX_SAMPLES)
-            light[:] = 0
-            for k in range(samples):
-                along = np.float32((k + 0.5) / samples - 0.5)
-                x = min(max(column + along * mx, np.float32(0)), last_x)
-                y = min(max(row + along * my, np.float32(0)), last_y)
+            mx, my = motion[row, column, 0], motion[row, column, 1]
+            samples = min(1 + int(np.ceil(max(abs(mx), abs(my)))), MAX_SAMPLES)
+            step = one / np.float32(samples)
+            along = half * step - half
+            light = zero
+            for _ in range(samples):
+                x = min(max(np.float32(column) + along * mx, zero), last_x)
+                y = min(max(np.float32(row) + along * my, zero), last_y)
+                along += step
                 x0, y0 = min(int(x), width - 2), min(int(y), height - 2)
-                ax, ay = x - x0, y - y0
-                for c in range(channels):
-                    top = sharp[y0, x0, c] * (1 - ax) + sharp[y0, x0 + 1, c] * ax
-                    bottom = sharp[y0 + 1, x0, c] * (1 - ax) + sharp[y0 + 1, x0 + 1, c] * ax
-                    light[c] += top * (1 - ay) + bottom * ay
-            factor = gain * vignette[row, column] / samples
-            for c in range(channels):
-                value = light[c] * factor
-                value += np.sqrt(variances[0] + variances[1] * value) * draws[row, column, c]
-                image[row, column, c] = np.uint8(min(max(value + 0.5, 0.0), 255.0))
-    return image
+                ax, ay = x - np.float32(x0), y - np.float32(y0)
+                top = sharp[y0, x0] + ax * (sharp[y0, x0 + 1] - sharp[y0, x0])
+                bottom = sharp[y0 + 1, x0] + ax * (sharp[y0 + 1, x0 + 1] - sharp[y0 + 1, x0])
+                light += top + ay * (bottom - top)
+            light *= step * gain * vignette[row, column]
+            light += np.sqrt(read + shot * light) * gaussian(key, row * width + column)
+            image[row, column] = np.uint8(min(max(light + half, zero), np.float32(255)))

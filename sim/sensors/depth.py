@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from airground.core.camera import PinholeCamera
 from sim.presets import DepthNoise
+from sim.sensors.hashed_noise import gaussian, noise_key
 
 BASELINE_M = 0.075
 INFRARED_FOCAL_PX = 585.0
@@ -42,7 +43,6 @@ def kinect_depth(
     height, width = depth.shape
     incidence = incidence_angles(depth, camera)
     shadow = projector_shadow(depth, camera.fx * BASELINE_M)
-    lateral = rng.standard_normal((height, width, 3), dtype=np.float32)
     parameters = np.array(
         [
             noise.axial_scale,
@@ -61,7 +61,7 @@ def kinect_depth(
         incidence,
         shadow,
         _correlated(height, width, rng),
-        lateral,
+        noise_key(rng),
         _patches(height, width, rng),
         parameters,
     )
@@ -95,24 +95,26 @@ def _incidence_angles(depth, intrinsics):  # type: ignore[no-untyped-def]
     """
     height, width = depth.shape
     fx, fy, cx, cy = intrinsics
+    one = np.float32(1)
+    inverse = one / depth
     angles = np.full((height, width), np.nan, np.float32)
     for row in range(height):
         up, down = max(row - 1, 0), min(row + 1, height - 1)
         for column in range(width):
             left, right = max(column - 1, 0), min(column + 1, width - 1)
-            here = 1 / depth[row, column]
+            here = inverse[row, column]
             slope_x = _smaller(
-                here - 1 / depth[row, left], 1 / depth[row, right] - here, left, column, right
+                here - inverse[row, left], inverse[row, right] - here, left, column, right
             )
             slope_y = _smaller(
-                here - 1 / depth[up, column], 1 / depth[down, column] - here, up, row, down
+                here - inverse[up, column], inverse[down, column] - here, up, row, down
             )
             # The plane n . X = 1 has 1/z = n . ray, with ray = ((u-cx)/fx, (v-cy)/fy, 1).
-            x, y = (column - cx) / fx, (row - cy) / fy
+            x, y = (np.float32(column) - cx) / fx, (np.float32(row) - cy) / fy
             nx, ny = slope_x * fx, slope_y * fy
             nz = here - nx * x - ny * y
-            length = np.sqrt((nx * nx + ny * ny + nz * nz) * (x * x + y * y + 1))
-            angles[row, column] = np.arccos(min(max(here / length, 0.0), 1.0))
+            length = np.sqrt((nx * nx + ny * ny + nz * nz) * (x * x + y * y + one))
+            angles[row, column] = np.arccos(min(here / length, one))
     return angles
 
 
@@ -157,7 +159,7 @@ def projector_shadow(depth, focal_times_baseline):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True, error_model="numpy")
-def _measure(depth, incidence, shadow, axial, lateral, patches, parameters):  # type: ignore[no-untyped-def]
+def _measure(depth, incidence, shadow, axial, key, patches, parameters):  # type: ignore[no-untyped-def]
     (scale, lateral_px, disparity_metres, step, limit, spread, nearest, farthest) = parameters
     height, width = depth.shape
     measured = np.full((height, width), np.nan, np.float32)
@@ -172,14 +174,15 @@ def _measure(depth, incidence, shadow, axial, lateral, patches, parameters):  # 
             grazing = theta / max(half_pi - theta, np.float32(0.02))
             # Eq. 2: silhouettes are ragged. Inside a surface the shift changes nothing.
             reach = lateral_px + np.float32(0.035) * grazing
-            x = int(np.round(column + reach * lateral[row, column, 0]))
-            y = int(np.round(row + reach * lateral[row, column, 1]))
+            index = 3 * (row * width + column)
+            x = int(np.round(np.float32(column) + reach * gaussian(key, index)))
+            y = int(np.round(np.float32(row) + reach * gaussian(key, index + 1)))
             x, y = min(max(x, 0), width - 1), min(max(y, 0), height - 1)
             there = depth[y, x]
             slack = np.float32(0.02) * z * (1 + grazing)
             if not abs(there - z) < slack:
                 # Half of the windows across a silhouette match nothing.
-                if lateral[row, column, 2] > 0 or shadow[y, x]:
+                if gaussian(key, index + 2) > 0 or shadow[y, x]:
                     continue
                 z = there
             # Eq. 3 and 4: axial noise, with the term for grazing angles.
