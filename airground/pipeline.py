@@ -252,5 +252,7 @@ def locate(localizer: MonteCarloLocalizer, sighting: Sighting) -> Iterator[Event
 
 def moved(cloud: PointCloud, T_a_b: SE3) -> PointCloud:
     """A cloud in frame b, expressed in frame a."""
-    normals = None if cloud.normals is None else cloud.normals @ T_a_b.rotation.T
+    normals = None
+    if cloud.normals is not None:
+        normals = (cloud.normals @ T_a_b.rotation.T).astype(np.float32)
     return PointCloud((T_a_b @ cloud.points).astype(np.float32), cloud.colours, normals)

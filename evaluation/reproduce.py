@@ -60,7 +60,7 @@ def reproduce(plan: Plan, recordings: Path, workers: int | None = None) -> Findi
         recordings: Folder of the recordings; those in it with the right name are used.
         workers: Processes at a time; None for one a core. The result does not depend on it.
     """
-    tasks = []
+    tasks: list[Task] = []
     for scene in plan.scenes:
         for flight in range(plan.flights):
             path = _recorded(plan, scene, flight, recordings, workers)

@@ -98,8 +98,11 @@ class Truth:
 
         For the true intrinsics; z along the optical axis.
         """
-        T_world_camera = self.T_world_camera(robot, stamp_ns)
-        directions = self.camera(robot).rays() @ T_world_camera.rotation.T
+        return self.cast(self.camera(robot), self.T_world_camera(robot, stamp_ns))
+
+    def cast(self, camera: PinholeCamera, T_world_camera: SE3) -> NDArray[np.float32]:
+        """(height, width) true depth [m] that any camera would see from anywhere."""
+        directions = camera.rays() @ T_world_camera.rotation.T
         origins = np.broadcast_to(T_world_camera.translation, directions.shape)
         rays = np.concatenate([origins, directions], axis=-1).astype(np.float32)
         # Directions have z = 1 in the camera, so that their multiples are depths.
