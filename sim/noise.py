@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 Image = NDArray[np.float32]
 
 _BANK_PX = 1024
+_FULL_PX = 16  # noise finer than this is worked out pixel by pixel
 
 
 def smooth_noise(shape: tuple[int, int], cell_px: float, rng: np.random.Generator) -> Image:
@@ -29,8 +30,20 @@ def octave_noise(
     persistence: float = 0.6,
 ) -> Image:  # fmt: skip
     """(H, W) of about unit deviation: octaves from coarse to fine, ever weaker."""
-    total = np.zeros(shape, np.float32)
-    weight, power, cell = 1.0, 0.0, coarsest_px
+    if coarsest_px >= 4 * _FULL_PX:
+        # What is coarse is worked out on a quarter of the rows and columns.
+        small = (-(-shape[0] // 4) + 1, -(-shape[1] // 4) + 1)
+        coarse_end = max(finest_px, _FULL_PX) / 4
+        total = octave_noise(small, coarsest_px / 4, coarse_end, rng, persistence)
+        total = cv2.resize(total, (4 * small[1], 4 * small[0]), interpolation=cv2.INTER_LINEAR)
+        total = np.ascontiguousarray(total[: shape[0], : shape[1]])
+        octaves = int(np.log2(coarsest_px / (4 * coarse_end))) + 1
+        power = float(sum(persistence ** (2 * k) for k in range(octaves)))
+        total *= np.float32(np.sqrt(power))
+        weight, cell = persistence**octaves, coarsest_px / 2**octaves
+    else:
+        total = np.zeros(shape, np.float32)
+        weight, power, cell = 1.0, 0.0, coarsest_px
     while cell >= finest_px:
         cv2.scaleAdd(smooth_noise(shape, cell, rng), weight, total, total)
         power += weight**2

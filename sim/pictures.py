@@ -24,7 +24,7 @@ CUBE_FACES: tuple[tuple[tuple[int, int, int], ...], ...] = (
     ((0, 0, 1), (1, 0, 0), (0, -1, 0)),
     ((0, 0, -1), (-1, 0, 0), (0, -1, 0)),
 )
-FACE_LIGHT_CELLS = 16
+FACE_LIGHT_CELLS = 12
 
 
 def add_glowing_material(spec: mujoco.MjSpec, name: str, texture: str) -> None:

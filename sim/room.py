@@ -15,9 +15,10 @@ from sim.scene import Room
 from sim.sheet import light_up
 from sim.surface import Mesh, join, rectangle_mesh
 
-FLOOR_PX_PER_M = 560.0
+FLOOR_PX_PER_M = 480.0
 WALL_PX_PER_M = 300.0
-LIGHT_CELL_M = 0.025
+FLOOR_LIGHT_CELL_M = 0.025
+WALL_LIGHT_CELL_M = 0.1  # no box stands close enough for its shadow to have an edge there
 COLLISION_GROUP = 3
 """Geoms of this group collide and are never drawn."""
 
@@ -39,7 +40,8 @@ def add_room(
         if baker:
             pixels = paint_plaster((2 * half_size[0], 2 * half_size[1]), WALL_PX_PER_M, rng)
             right = np.cross([0.0, 0.0, 1.0], normal)
-            light = _light_map(baker, centre, right * half_size[0], np.array([0, 0, half_size[1]]))
+            up = np.array([0, 0, half_size[1]])
+            light = _light_map(baker, centre, right * half_size[0], up, WALL_LIGHT_CELL_M)
             add_picture(spec, name, _lit(pixels, light), cube=False)
         _add_panel(spec, name, half_size, centre, _wall_quaternion(normal), baker is not None)
 
@@ -52,7 +54,8 @@ def _add_floor(
     picture = None
     if baker:
         paint = paint_concrete if room.floor == "concrete" else paint_print
-        light = _light_map(baker, np.zeros(3), np.array([half[0], 0, 0]), np.array([0, half[1], 0]))
+        right, up = np.array([half[0], 0, 0]), np.array([0, half[1], 0])
+        light = _light_map(baker, np.zeros(3), right, up, FLOOR_LIGHT_CELL_M)
         picture = _lit(paint(room.size_m, FLOOR_PX_PER_M, rng), light)
     for index, (sx, sy) in enumerate(((-1, 1), (1, 1), (-1, -1), (1, -1))):
         name = f"floor_{index}"
@@ -86,11 +89,11 @@ def _add_panel(
 
 
 def _light_map(
-    baker: LightBaker, centre: NDArray, half_right: NDArray, half_up: NDArray
+    baker: LightBaker, centre: NDArray, half_right: NDArray, half_up: NDArray, cell_m: float
 ) -> NDArray[np.float32]:
     """(rows, columns, 3) light factors over a rectangle, the first row at its top."""
     rows, columns = (
-        int(np.ceil(2 * np.linalg.norm(half) / LIGHT_CELL_M)) for half in (half_up, half_right)
+        int(np.ceil(2 * np.linalg.norm(half) / cell_m)) for half in (half_up, half_right)
     )
     v = 1 - (np.arange(rows) + 0.5) / rows * 2
     u = (np.arange(columns) + 0.5) / columns * 2 - 1
