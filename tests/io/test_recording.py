@@ -116,7 +116,7 @@ BROKEN = {
         "lies outside the 24x16 image",
     ),
     "no rotation": (
-        lambda p: edit(p / "recording.toml", "0.955336489125606", "0.99"),
+        lambda p: edit(p / "recording.toml", "0.9553364891256", "0.9953364891256"),
         r"T_body_imu.*must be a rotation",
     ),
     "missing image": (lambda p: (p / IMAGE).unlink(), "83333333.png: .*missing"),

@@ -1,0 +1,55 @@
+"""The pipeline is told values that are off by the size of the preset, no more, no less."""
+
+import numpy as np
+import pytest
+
+from airground.core.se3 import SE3
+from sim.presets import HARSH, NOMINAL, NONE, SensorPreset
+from sim.robot_motion import Mounting
+from sim.sensors.miscalibration import Calibrations, calibrate
+
+MAV = Mounting(
+    SE3.from_heading(0.5, (0.0, 0.01, 0.02)), SE3.from_rotation_vector((3, 0.2, 0), (0.1, 0, 0))
+)
+GROUND = Mounting(SE3.identity(), SE3.from_rotation_vector((-1.5, 0, 0.1), (0, 0, 0.5)))
+
+
+def drawn(preset: SensorPreset, seed: int = 0) -> Calibrations:
+    return calibrate(420.0, MAV, GROUND, preset, np.random.default_rng(seed))
+
+
+def test_without_errors_the_truth_is_told() -> None:
+    true, told = drawn(NONE).true, drawn(NONE).told
+    assert (true.mav.camera, true.ground.camera) == (told.mav.camera, told.ground.camera)
+    assert true.ground.depth == told.ground.depth
+    for one, other in ((true.mav, told.mav), (true.ground, told.ground)):
+        np.testing.assert_allclose(one.T_imu_camera, other.T_imu_camera, atol=1e-12)
+
+
+@pytest.mark.parametrize(("preset", "times"), [(NOMINAL, 1), (HARSH, 3)])
+@pytest.mark.parametrize("robot", ["mav", "ground"])
+def test_sizes_of_the_errors(preset: SensorPreset, times: int, robot: str) -> None:
+    calibrations = drawn(preset)
+    true, told = getattr(calibrations.true, robot), getattr(calibrations.told, robot)
+    assert abs(told.camera.fx / true.camera.fx - 1) == pytest.approx(times * 1e-3)
+    assert told.camera.fx == told.camera.fy
+    turn = true.calibration().T_imu_camera.inverse() @ told.calibration().T_imu_camera
+    assert np.rad2deg(turn.angle()) == pytest.approx(times * 0.1)
+    assert np.abs(turn.translation).max() < 1e-12
+    assert told.T_body_imu == true.T_body_imu
+    assert told.camera.time_offset_ns == 0
+    assert abs(true.camera.time_offset_ns) == times * 1_000_000
+    scale = calibrations.true.ground.depth.units_per_m / calibrations.told.ground.depth.units_per_m
+    assert abs(scale - 1) == pytest.approx(times * 3e-3)
+
+
+def test_signs_are_drawn_by_the_seed() -> None:
+    clocks = {drawn(NOMINAL, seed).true.mav.camera.time_offset_ns for seed in range(20)}
+    assert clocks == {-1_000_000, 1_000_000}
+    assert drawn(NOMINAL, 3) == drawn(NOMINAL, 3)
+
+
+def test_the_true_camera_is_the_one_of_the_scene() -> None:
+    true = drawn(HARSH).true
+    assert (true.mav.camera.fx, true.mav.camera.cx, true.mav.camera.cy) == (420.0, 375.5, 239.5)
+    assert true.ground.calibration().camera.fx == 525.0

@@ -1,0 +1,113 @@
+"""The camera's faults have the size and the direction that they should have."""
+
+import numpy as np
+import pytest
+
+from airground.core.camera import PinholeCamera
+from airground.core.se3 import SE3
+from sim.presets import HARSH, NOMINAL, ImageNoise
+from sim.sensors.camera import ExposureDrift, ImageSensor, pixel_motion
+from sim.sensors.hashed_noise import gaussian, noise_key
+
+CAMERA = PinholeCamera(80, 60, 70.0, 72.0, 39.0, 30.5)
+STILL = SE3.identity()
+FAULTLESS = ImageNoise(0.0, 0.0, 0.0, 0.0, 0.01)
+
+
+def rng() -> np.random.Generator:
+    return np.random.default_rng(5)
+
+
+def test_pixel_motion_is_that_of_projected_points() -> None:
+    """A small motion moves each pixel's point as projecting it before and after says."""
+    depth = rng().uniform(1.0, 4.0, (60, 80)).astype(np.float32)
+    T_start_end = SE3.exp([1e-3, -2e-3, 1.5e-3, 2e-3, 1e-3, -1.5e-3])
+    points = CAMERA.back_project(depth.astype(np.float64)).reshape(-1, 3)
+    moved = CAMERA.project(T_start_end.inverse() @ points) - CAMERA.project(points)
+    motion = pixel_motion(depth, CAMERA, T_start_end).reshape(-1, 2)
+    assert np.abs(moved).max() > 0.1
+    assert np.abs(motion - moved).max() < 0.003
+
+
+def test_nothing_far_away_moves_with_a_turn_only() -> None:
+    nowhere = np.full((60, 80), np.nan, np.float32)
+    assert np.abs(pixel_motion(nowhere, CAMERA, SE3.exp([0.1, 0.2, 0.3, 0, 0, 0]))).max() == 0
+    turned = pixel_motion(nowhere, CAMERA, SE3.exp([0, 0, 0, 0, 0.01, 0]))
+    middle = turned[30, 39]
+    assert middle == pytest.approx([-0.7, 0.0], abs=1e-3)  # looking right moves all to the left
+
+
+def test_a_perfect_camera_changes_nothing() -> None:
+    sharp = rng().integers(0, 256, (60, 80, 3), np.uint8)
+    sensor = ImageSensor.of(CAMERA, FAULTLESS, rng())
+    depth = np.ones((60, 80), np.float32)
+    np.testing.assert_array_equal(sensor.expose(sharp, depth, STILL, 1.0, rng()), sharp)
+
+
+def test_blur_is_the_mean_over_the_exposure() -> None:
+    """An edge that moves by 8 pixels becomes a ramp of that width, centred on the edge."""
+    sharp = np.zeros((60, 80, 1), np.uint8)
+    sharp[:, 40:] = 200
+    depth = np.full((60, 80), 2.0, np.float32)
+    T_start_end = SE3.exp([8 * 2.0 / CAMERA.fx, 0, 0, 0, 0, 0])
+    blurred = ImageSensor.of(CAMERA, FAULTLESS, rng()).expose(sharp, depth, T_start_end, 0.0, rng())
+    row = blurred[30, :, 0].astype(float)
+    # The edge lies at 39.5; the mean over +-4 px of a step is a line.
+    expected = np.clip((np.arange(80) - 39.5 + 4.0) / 8.0, 0, 1) * 200
+    assert np.abs(row - expected).max() < 14
+    assert row.sum() == pytest.approx(expected.sum(), rel=0.01)
+
+
+@pytest.mark.parametrize(("noise", "deviation"), [(NOMINAL.image, 2.0), (HARSH.image, 4.0)])
+def test_noise_at_mid_grey(noise: ImageNoise, deviation: float) -> None:
+    only_noise = ImageNoise(noise.read_noise, noise.shot_noise, 0.0, 0.0, 0.0)
+    grey = np.full((60, 80, 3), 128, np.uint8)
+    depth = np.ones((60, 80), np.float32)
+    image = ImageSensor.of(CAMERA, only_noise, rng()).expose(grey, depth, STILL, 0.0, rng())
+    error = image.astype(float) - 128
+    assert error.std() == pytest.approx(deviation, rel=0.05)
+    assert abs(error.mean()) < 0.1
+    # Channels and neighbours are independent.
+    assert abs(np.corrcoef(error[..., 0].ravel(), error[..., 1].ravel())[0, 1]) < 0.05
+    assert abs(np.corrcoef(error[:, 1:].ravel(), error[:, :-1].ravel())[0, 1]) < 0.05
+
+
+def test_vignetting_darkens_the_corners_by_its_share() -> None:
+    noise = ImageNoise(0.0, 0.0, 0.2, 0.0, 0.0)
+    white = np.full((60, 80, 1), 200, np.uint8)
+    depth = np.ones((60, 80), np.float32)
+    image = ImageSensor.of(CAMERA, noise, rng()).expose(white, depth, STILL, 0.0, rng())
+    assert image[0, 0, 0] == 160
+    assert image[30, 40, 0] == 200
+
+
+def test_exposure_wanders_slowly_and_by_its_deviation() -> None:
+    times = np.linspace(0, 2000, 40_000)
+    logs = []
+    for seed in range(5):
+        drift = ExposureDrift.draw(0.03, np.random.default_rng(seed))
+        logs.append(np.log([drift.gain(t) for t in times]))
+    logs = np.array(logs)
+    assert logs.std() == pytest.approx(0.03, rel=0.15)
+    assert np.abs(np.diff(logs, axis=1)).max() / (times[1] - times[0]) < 0.15
+
+
+def test_the_same_generator_gives_the_same_picture() -> None:
+    sharp = rng().integers(0, 256, (60, 80, 3), np.uint8)
+    sensor = ImageSensor.of(CAMERA, NOMINAL.image, rng())
+    depth = np.ones((60, 80), np.float32)
+    one, two = (sensor.expose(sharp, depth, STILL, 1.0, rng()) for _ in range(2))
+    other = sensor.expose(sharp, depth, STILL, 1.0, np.random.default_rng(6))
+    np.testing.assert_array_equal(one, two)
+    assert (one != other).mean() > 0.5
+
+
+@pytest.mark.kernel
+def test_hashed_noise_is_nearly_normal() -> None:
+    key = noise_key(rng())
+    with np.errstate(over="ignore"):
+        values = np.array([gaussian(key, i) for i in range(50_000)], np.float64)
+    assert abs(values.mean()) < 0.02
+    assert values.std() == pytest.approx(1.0, abs=0.02)
+    assert (values**4).mean() == pytest.approx(3.0, abs=0.25)
+    assert abs(np.corrcoef(values[1:], values[:-1])[0, 1]) < 0.02
