@@ -51,7 +51,7 @@ def lattice_index(height_map: HeightMap) -> NDArray[np.int64]:
 
 
 @njit(cache=True, error_model="numpy")
-def _cell_extent(points: NDArray, cells_per_m: float) -> NDArray[np.int64]:
+def _cell_extent(points: NDArray, cells_per_m: np.float32) -> NDArray[np.int64]:
     """(2, 2) lowest and highest cell index of finite points; reversed without any."""
     half = np.float32(0.5)
     extent = np.array([[2**40, 2**40], [-(2**40), -(2**40)]])
@@ -68,7 +68,7 @@ def _cell_extent(points: NDArray, cells_per_m: float) -> NDArray[np.int64]:
 
 @njit(cache=True, error_model="numpy")
 def _raise_cells(
-    points: NDArray, first_x: int, first_y: int, cells_per_m: float, heights: NDArray
+    points: NDArray, first_x: int, first_y: int, cells_per_m: np.float32, heights: NDArray
 ) -> None:
     half = np.float32(0.5)
     for i in range(points.shape[0]):

@@ -105,8 +105,8 @@ def _add_row(
     filled: NDArray,
     ground: NDArray,
     mask: NDArray,
-    weight_x: float,
-    weight_y: float,
+    weight_x: np.float32,
+    weight_y: np.float32,
     sums: NDArray,
 ) -> None:
     """Add one row of the overlap; rows of `ground` and `mask` are the two neighbours in x."""
@@ -148,7 +148,7 @@ def sums_at_poses(
 
     Args:
         cells: (K, 3) filled aerial cells: x, y [cells] from the camera, height [m].
-        ground: Ground heights with 0 in holes, at least one empty cell around the edge.
+        ground: Ground heights with 0 in holes, at least two empty cells around the edge.
         ground_mask: 1 where filled.
         poses: (M, 3) index of the camera in `ground` [cells], and heading [rad].
     """

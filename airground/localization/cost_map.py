@@ -209,12 +209,12 @@ def overlay_at(aerial: HeightMap, ground: HeightMap, positions: NDArray) -> Over
 
 def overlay_turned(aerial: HeightMap, ground: HeightMap, poses: NDArray) -> Overlays:
     """The same for M poses (M, 3): x, y [m], and a turn of the aerial map [rad]."""
-    a, g = masked(aerial.heights), masked(ground.heights, margin=1)
+    a, g = masked(aerial.heights), masked(ground.heights, margin=2)
     ix, iy = np.nonzero(a.mask)
     first = lattice_index(aerial)
     cells = np.column_stack([ix + first[0], iy + first[1], a.heights[ix, iy]]).astype(np.float32)
     poses = np.array(poses, np.float64)
-    poses[:, :2] = poses[:, :2] * ground.cells_per_m - lattice_index(ground) + 1
+    poses[:, :2] = poses[:, :2] * ground.cells_per_m - lattice_index(ground) + 2
     sums = sums_at_poses(cells, g.heights, g.mask, poses)
     return Overlays(sums, a.mean, g.mean, aerial.filled_cells)
 

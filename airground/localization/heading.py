@@ -63,5 +63,5 @@ class HeadingEstimator:
         distance = np.minimum(np.arange(BINS), BINS - np.arange(BINS)) * 360.0 / BINS
         kernel = np.exp(-0.5 * (distance / KERNEL_DEG) ** 2)
         density = np.fft.irfft(np.fft.rfft(self._counts) * np.fft.rfft(kernel), BINS)
-        bell = np.exp(-0.5 * (distance / (6 * KERNEL_DEG)) ** 2)
+        bell = np.exp(-0.5 * (distance / (3 * KERNEL_DEG)) ** 2)
         return np.roll(bell, int(np.argmax(density)))

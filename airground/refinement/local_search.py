@@ -78,9 +78,9 @@ def _shift_costs(
             for ix in range(max(0, -x0), min(aerial.shape[0], ground.shape[0] - x0)):
                 if low < high:
                     sums = _row_sums(aerial[ix, low:high], ground[x0 + ix, y0 + low : y0 + high])
-                    count += sums[0]
-                    total += sums[1]
-                    squares += sums[2]
+                    count += float(sums[0])
+                    total += float(sums[1])
+                    squares += float(sums[2])
             if count > 0:
                 counts[sx, sy] = count
                 heights[sx, sy] = total / count
@@ -89,7 +89,7 @@ def _shift_costs(
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
-def _row_sums(aerial: NDArray, ground: NDArray) -> tuple[float, float, float]:
+def _row_sums(aerial: NDArray, ground: NDArray) -> tuple[np.float32, np.float32, np.float32]:
     zero, one = np.float32(0), np.float32(1)
     count, total, squares = zero, zero, zero
     for i in range(len(aerial)):

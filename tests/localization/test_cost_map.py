@@ -1,0 +1,142 @@
+"""Costs of overlays: exact against naive loops, and the laws that they obey."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from airground.config import Localization
+from airground.core.belief import HeightMap
+from airground.localization.cost_map import compute_cost_map, overlay_at, overlay_turned
+from tests.localization import naive
+
+CELLS_PER_M = 10.0
+
+
+def random_map(rng, shape, first=(0, 0), holes=0.2, level=0.0):
+    """Blocks of random heights with noise and holes."""
+    coarse = rng.uniform(0, 1, (shape[0] // 4 + 1, shape[1] // 4 + 1))
+    heights = np.kron(coarse, np.ones((4, 4)))[: shape[0], : shape[1]] + level
+    heights += rng.normal(0, 0.01, shape)
+    heights[rng.random(shape) < holes] = np.nan
+    return HeightMap(heights.astype(np.float32), np.array(first) / CELLS_PER_M, CELLS_PER_M)
+
+
+def config(cost, **changes):
+    return Localization(cost=cost, search_radius_m=1.0, **changes)
+
+
+@pytest.mark.parametrize("cost", ["zmssd", "ncc"])
+@pytest.mark.parametrize("seed", range(3))
+def test_all_offsets_equal_a_naive_double_loop(cost, seed):
+    rng = np.random.default_rng(seed)
+    aerial = random_map(rng, (14, 11), (-6, -4), level=2.0)
+    ground = random_map(rng, (26, 30), (-12, -13))
+    setting = config(cost)
+    found = compute_cost_map(aerial, ground, (0.6, -0.5), 0.3, setting)
+    assert found.costs.shape == (21, 21)
+    assert found.heading == 0.3
+    first = np.rint(found.origin * CELLS_PER_M).astype(int)
+    expected = np.full(found.costs.shape, np.nan)
+    for ox, oy in np.ndindex(*expected.shape):
+        start = np.array([-6, -4]) + first + (ox, oy) - (-12, -13)
+        below = naive.piece(ground.heights, start, (14, 11))
+        expected[ox, oy] = naive.cost(aerial.heights, below, setting, aerial.filled_cells)
+    assert np.isnan(expected).any()
+    assert np.isfinite(expected).any()
+    np.testing.assert_allclose(found.costs, expected, rtol=1e-4, atol=2e-6)
+
+
+@pytest.mark.parametrize("cost", ["zmssd", "ncc"])
+def test_particles_equal_naive_interpolation(cost):
+    rng = np.random.default_rng(5)
+    aerial, ground = random_map(rng, (14, 11), (-6, -4)), random_map(rng, (26, 30), (-12, -13))
+    setting = config(cost)
+    positions = rng.uniform(-1.2, 1.2, (20, 2))
+    found = overlay_at(aerial, ground, positions).costs(setting)
+    turned = overlay_turned(aerial, ground, np.column_stack([positions, np.zeros(20)]))
+    for p, u in enumerate(positions):
+        below = np.empty((14, 11))
+        for ix, iy in np.ndindex(14, 11):
+            x, y = np.array([ix - 6, iy - 4]) + u * CELLS_PER_M - (-12, -13)
+            below[ix, iy] = naive.bilinear(ground.heights, x, y)
+        expected = naive.cost(aerial.heights, below, setting, aerial.filled_cells)
+        np.testing.assert_allclose(found[p], expected, rtol=1e-3, atol=1e-5)
+    np.testing.assert_allclose(turned.costs(setting), found, rtol=2e-3, atol=1e-4)
+
+
+@pytest.mark.parametrize("cost", ["zmssd", "ncc"])
+def test_a_particle_on_the_lattice_costs_what_the_map_says(cost):
+    rng = np.random.default_rng(6)
+    aerial, ground = random_map(rng, (20, 16), (-9, -7)), random_map(rng, (40, 40), (-20, -20))
+    setting = config(cost)
+    whole = compute_cost_map(aerial, ground, (0.0, 0.0), 0.0, setting)
+    cells = np.array(list(np.ndindex(*whole.costs.shape)))
+    single = overlay_at(aerial, ground, whole.origin + cells / CELLS_PER_M).costs(setting)
+    np.testing.assert_allclose(single, whole.costs.ravel(), rtol=1e-3, atol=1e-5)
+
+
+@pytest.mark.parametrize("cost", ["zmssd", "ncc"])
+@settings(max_examples=15, deadline=None)
+@given(st.integers(-5, 5), st.integers(-5, 5), st.floats(-5, 5))
+def test_a_known_shift_and_height_are_recovered(cost, dx, dy, lift):
+    ground = random_map(np.random.default_rng(7), (60, 60), (-30, -30), holes=0.1)
+    piece = ground.heights[15:45, 15:45] + np.float32(lift)
+    aerial = HeightMap(piece, np.array([-15 - dx, -15 - dy]) / CELLS_PER_M, CELLS_PER_M)
+    best = compute_cost_map(aerial, ground, (0.0, 0.0), 0.0, config(cost)).best()
+    np.testing.assert_allclose(best, np.array([dx, dy]) / CELLS_PER_M, atol=1e-9)
+    offset = overlay_at(aerial, ground, best[None]).height_offsets()[0]
+    assert offset == pytest.approx(-lift, abs=1e-4)
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.floats(-20, 20))
+def test_a_vertical_offset_leaves_eq_2_unchanged(lift):
+    rng = np.random.default_rng(8)
+    aerial, ground = random_map(rng, (20, 16), (-9, -7)), random_map(rng, (40, 40), (-20, -20))
+    lifted = HeightMap(aerial.heights + np.float32(lift), aerial.origin, CELLS_PER_M)
+    low, high = (
+        compute_cost_map(m, ground, (0, 0), 0.0, config("zmssd")).costs for m in (aerial, lifted)
+    )
+    np.testing.assert_allclose(low, high, rtol=1e-3, atol=1e-5)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.integers(-40, 40), st.integers(-40, 40))
+def test_moving_ground_and_search_moves_the_costs(dx, dy):
+    rng = np.random.default_rng(9)
+    aerial, ground = random_map(rng, (20, 16), (-9, -7)), random_map(rng, (40, 40), (-20, -20))
+    shift = np.array([dx, dy]) / CELLS_PER_M
+    moved = HeightMap(ground.heights, ground.origin + shift, CELLS_PER_M)
+    here = compute_cost_map(aerial, ground, (0, 0), 0.0, config("ncc"))
+    there = compute_cost_map(aerial, moved, shift, 0.0, config("ncc"))
+    np.testing.assert_allclose(there.origin, here.origin + shift, atol=1e-9)
+    np.testing.assert_array_equal(here.costs, there.costs)
+
+
+def test_swapping_the_maps_mirrors_eq_2():
+    rng = np.random.default_rng(10)
+    a, g = random_map(rng, (20, 20), (-10, -10)), random_map(rng, (20, 20), (-10, -10))
+    setting = config("zmssd", min_overlap=0.0)
+    one = compute_cost_map(a, g, (0, 0), 0.0, setting).costs
+    other = compute_cost_map(g, a, (0, 0), 0.0, setting).costs
+    np.testing.assert_allclose(one, other[::-1, ::-1], rtol=1e-3, atol=1e-5)
+
+
+def test_turning_the_aerial_map_back_finds_it():
+    """A quarter turn is exact on the lattice."""
+    ground = random_map(np.random.default_rng(11), (41, 41), (-20, -20), holes=0.1)
+    turned = HeightMap(np.rot90(ground.heights, -1).copy(), ground.origin, CELLS_PER_M)
+    poses = np.array([[0.0, 0.0, np.pi / 2], [0.0, 0.0, 0.0]])
+    right, wrong = overlay_turned(turned, ground, poses).costs(config("ncc"))
+    assert right == pytest.approx(0.0, abs=1e-3)
+    assert wrong > 0.3
+
+
+def test_flat_ground_correlates_with_nothing():
+    rng = np.random.default_rng(12)
+    noise = rng.normal(0, 0.004, (40, 40)).astype(np.float32)
+    ground = HeightMap(noise, np.array([-2.0, -2.0]), CELLS_PER_M)
+    aerial = HeightMap(noise[10:30, 10:30], np.array([-1.0, -1.0]), CELLS_PER_M)
+    costs = compute_cost_map(aerial, ground, (0, 0), 0.0, config("ncc")).costs
+    assert np.nanmin(costs) > 0.95

@@ -1,0 +1,157 @@
+"""Monte Carlo localization on heaps of boxes: found where it is, refused where it is not."""
+
+import numpy as np
+import pytest
+
+from airground.config import Config, paper
+from airground.core.belief import HeightMap
+from airground.core.events import BeliefUpdated, CostMapComputed, HeightMapsMade
+from airground.core.se3 import SE3
+from airground.errors import InputError
+from airground.localization.particle_filter import MonteCarloLocalizer
+from tests.localization.synthetic import aerial_points, box_heap, flat_world, ground_points
+
+HEADING = 2.0
+T_MAV_WORLD = SE3.from_heading(-HEADING, (1.0, 2.0, 0.3))
+PATH = [(-0.6, 0.2), (-0.2, 0.3), (0.2, 0.3), (0.6, 0.2)]
+
+
+class Flight:
+    """What the MAV saw along a path over a world, and the ground robot's points."""
+
+    def __init__(self, world, ground_world, frames=40):
+        rng = np.random.default_rng(3)
+        self.maps = []
+        for x, y in PATH:
+            points = (T_MAV_WORLD @ aerial_points(world, x, y, rng, 0.1)).astype(np.float32)
+            self.maps.append((points, T_MAV_WORLD @ np.array([x, y, 2.2])))
+        self.ground = ground_points(ground_world, rng, frames=frames)
+
+    def localize(self, config, heading=HEADING, seed=0):
+        localizer = MonteCarloLocalizer(config, np.random.default_rng(seed))
+        events = []
+        for stamp, (points, position) in enumerate(self.maps):
+            robot = np.array([0.3, 0.0])
+            events.append(
+                list(localizer.update(stamp, points, position, self.ground, robot, heading))
+            )
+        return events
+
+
+def beliefs(events):
+    return [update[-1].belief for update in events]
+
+
+@pytest.fixture(scope="module")
+def flight():
+    heap = box_heap(1)
+    return Flight(heap, heap)
+
+
+@pytest.fixture(scope="module")
+def flat_flight():
+    return Flight(flat_world(), flat_world(), frames=15)
+
+
+@pytest.fixture(scope="module")
+def lost_flight():
+    return Flight(box_heap(1), box_heap(2))
+
+
+def changed(config, **changes):
+    local = config.localization.model_copy(update=changes)
+    return config.model_copy(update={"localization": local})
+
+
+def test_best_converges_on_the_truth(flight):
+    found = beliefs(flight.localize(Config()))
+    for belief, place in zip(found, PATH, strict=True):
+        assert np.hypot(*(belief.estimate[:2] - place)) < 0.1
+        assert belief.estimate[2] == pytest.approx(HEADING)
+    last = found[-1]
+    assert last.converged, last.refusal
+    assert last.height_offset == pytest.approx(-0.3, abs=0.03)
+    corner = np.array([0.4, 0.1, 0.5])
+    np.testing.assert_allclose(last.T_ground_mav @ (T_MAV_WORLD @ corner), corner, atol=0.12)
+
+
+def test_searched_heading_finds_position_and_turn(flight):
+    config = changed(Config(), heading="search", headings=180)
+    last = beliefs(flight.localize(config, heading=None))[-1]
+    assert np.hypot(*(last.estimate[:2] - PATH[-1])) < 0.2
+    assert abs(np.angle(np.exp(1j * (last.estimate[2] - HEADING)))) < np.deg2rad(3)
+
+
+def test_paper_computes_the_cost_map_once_and_best_each_time(flight):
+    kinds = [[type(event) for event in update] for update in flight.localize(paper())]
+    first = [HeightMapsMade, CostMapComputed, BeliefUpdated]
+    assert kinds == [first] + [[HeightMapsMade, BeliefUpdated]] * 3
+    assert [len(update) for update in flight.localize(Config())] == [3] * 4
+
+
+def test_sigma_as_published_on_square_metres_never_converges(flight):
+    assert not any(belief.converged for belief in beliefs(flight.localize(paper())))
+
+
+def test_same_seed_same_belief(flight):
+    one, other = (beliefs(flight.localize(Config(), seed=4))[-1] for _ in range(2))
+    np.testing.assert_array_equal(one.particles, other.particles)
+
+
+@pytest.mark.parametrize(
+    "config",
+    [
+        Config(),
+        paper(),
+        changed(paper(), sigma_units="minmax"),
+        changed(Config(), heading="search"),
+    ],
+    ids=["best", "paper", "minmax", "search"],
+)
+def test_flat_ground_claims_nothing_and_says_why(flat_flight, config):
+    if config.localization.heading == "search":
+        config = changed(config, headings=30)
+    for belief in beliefs(flat_flight.localize(config)):
+        assert not belief.converged
+        assert "no structure" in belief.refusal
+
+
+@pytest.mark.parametrize("cost_sigma", [("ncc", 0.05), ("zmssd", 0.001)])
+def test_another_heaps_map_is_refused(lost_flight, cost_sigma):
+    cost, sigma = cost_sigma
+    config = changed(Config(), cost=cost, sigma=sigma)
+    for belief in beliefs(lost_flight.localize(config)):
+        assert not belief.converged
+        assert belief.refusal
+
+
+def test_a_map_without_overlap_neither_kills_the_belief_nor_claims(flight):
+    localizer = MonteCarloLocalizer(Config(), np.random.default_rng(0))
+    robot = np.zeros(2)
+    (points, position) = flight.maps[0]
+    steps = [flight.ground, flight.ground + np.float32(50), flight.ground]
+    found = []
+    for stamp, ground in enumerate(steps):
+        *_, last = localizer.update(stamp, points, position, ground, robot, HEADING)
+        found.append(last.belief)
+    assert not found[1].converged
+    assert "lies on the ground map" in found[1].refusal
+    assert np.hypot(*(found[2].estimate[:2] - PATH[0])) < 0.1
+
+
+@pytest.mark.parametrize("points", [np.zeros((0, 3), np.float32), np.zeros((3, 3), np.float32)])
+def test_an_empty_surface_is_refused_not_an_error(flight, points):
+    localizer = MonteCarloLocalizer(Config(), np.random.default_rng(0))
+    *_, last = localizer.update(0, points, np.zeros(3), flight.ground, np.zeros(2), HEADING)
+    assert not last.belief.converged
+    assert last.belief.refusal
+
+
+def test_what_cannot_be_used_is_named(flight):
+    points, position = flight.maps[0]
+    localizer = MonteCarloLocalizer(Config(), np.random.default_rng(0))
+    with pytest.raises(InputError, match="stamp 7: the heading"):
+        list(localizer.update(7, points, position, flight.ground, np.zeros(2), None))
+    coarse = HeightMap(np.zeros((3, 3), np.float32), np.zeros(2), 10.0)
+    with pytest.raises(InputError, match="10 cells/m, expected 25"):
+        list(localizer.update(7, points, position, coarse, np.zeros(2), HEADING))
