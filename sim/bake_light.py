@@ -10,10 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import open3d as o3d
 from numba import njit
 from numpy.typing import NDArray
 
+from sim.ray_caster import RayCaster
 from sim.scene import Light
 from sim.surface import Mesh
 
@@ -43,15 +43,12 @@ class LightBaker:
     """
 
     light: Light
-    caster: o3d.t.geometry.RaycastingScene
+    caster: RayCaster
     albedo: NDArray[np.float32]
 
     @classmethod
     def of(cls, mesh: Mesh, albedo: NDArray, light: Light) -> LightBaker:
-        caster = o3d.t.geometry.RaycastingScene(nthreads=2)
-        vertices, triangles = mesh
-        caster.add_triangles(vertices.astype(np.float32), triangles.astype(np.uint32))
-        return cls(light, caster, np.asarray(albedo, np.float32))
+        return cls(light, RayCaster(mesh), np.asarray(albedo, np.float32))
 
     def shade(self, points: NDArray, normals: NDArray) -> NDArray[np.float32]:
         """(N, 3) factors for display values (gamma 2.2) of a surface lit by this light.
@@ -86,13 +83,13 @@ class LightBaker:
             rays = np.empty((len(facing), len(directions), 6), np.float32)
             rays[..., :3] = origins[facing, None]
             rays[..., 3:] = directions
-            lit[facing] = ~self.caster.test_occlusions(o3d.core.Tensor(rays)).numpy()
+            lit[facing] = ~self.caster.blocked(rays)
         return (cosine * lit).sum(1) / np.maximum(directions[:, 2], 0).sum()
 
     def _ambient(self, origins: NDArray, normals: NDArray) -> NDArray:
         """(N, 3): open hemisphere gives the ambient level, what it hits bounces some light."""
         rays = _hemisphere_rays(origins, normals, AMBIENT_SAMPLES)
-        hit = self.caster.cast_rays(o3d.core.Tensor(rays))["primitive_ids"].numpy()
+        _, hit = self.caster.hits(rays)
         bounce = _BOUNCE * (self.light.main + self.light.ambient)
         return _gather(hit, self.albedo, bounce, self.light.ambient * _AMBIENT_COLOUR)
 

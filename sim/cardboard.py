@@ -19,7 +19,8 @@ from sim.sheet import Colour, Sheet
 
 BOARDS: tuple[Colour, ...] = (
     (187, 147, 104), (176, 133, 90), (199, 163, 121), (165, 124, 84), (190, 152, 112),
-    (181, 140, 94), (206, 174, 136), (228, 224, 214), (171, 137, 104), (214, 204, 184),
+    (181, 140, 94), (206, 174, 136), (228, 224, 214), (171, 137, 104), (193, 158, 116),
+    (160, 122, 88), (184, 150, 112),
 )  # fmt: skip
 INKS: tuple[Colour, ...] = (
     (42, 38, 36), (42, 38, 36), (33, 56, 120), (158, 34, 32), (24, 96, 62), (196, 88, 20),
@@ -56,14 +57,14 @@ class Make:
     band: bool
 
     @classmethod
-    def draw(cls, rng: np.random.Generator) -> Make:
+    def draw(cls, rng: np.random.Generator, brand: str) -> Make:
         inks = rng.permutation(len(INKS))
         return cls(
             board=BOARDS[rng.integers(len(BOARDS))],
             ink=INKS[inks[0]],
             accent=INKS[inks[1]],
             tape=TAPES[rng.integers(len(TAPES))],
-            brand=marks.BRANDS[rng.integers(len(marks.BRANDS))],
+            brand=brand,
             mark=int(rng.integers(8)),
             weight=int(rng.choice([400, 600, 800, 900])),
             layout=int(rng.integers(2**31)),

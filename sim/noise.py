@@ -35,8 +35,8 @@ def octave_noise(
         small = (-(-shape[0] // 4) + 1, -(-shape[1] // 4) + 1)
         coarse_end = max(finest_px, _FULL_PX) / 4
         total = octave_noise(small, coarsest_px / 4, coarse_end, rng, persistence)
-        total = cv2.resize(total, (4 * small[1], 4 * small[0]), interpolation=cv2.INTER_LINEAR)
-        total = np.ascontiguousarray(total[: shape[0], : shape[1]])
+        larger = cv2.resize(total, (4 * small[1], 4 * small[0]), interpolation=cv2.INTER_LINEAR)
+        total = np.ascontiguousarray(larger[: shape[0], : shape[1]], np.float32)
         octaves = int(np.log2(coarsest_px / (4 * coarse_end))) + 1
         power = float(sum(persistence ** (2 * k) for k in range(octaves)))
         total *= np.float32(np.sqrt(power))
@@ -90,8 +90,9 @@ def cloud_bank(cell_px: int) -> Image:
 def dent_bank(cell_px: int) -> Image:
     """How light or dark the slopes of shallow dents look, about -1 to 1."""
     depth = np.minimum(cloud_bank(cell_px) + 1.0, 0)  # only the deepest places give way
-    depth = cv2.GaussianBlur(depth, (0, 0), cell_px / 9)
-    return cell_px * (np.gradient(depth, axis=1) + np.gradient(depth, axis=0)) / 2
+    depth = np.asarray(cv2.GaussianBlur(depth, (0, 0), cell_px / 9), np.float32)
+    slope = np.gradient(depth, axis=1) + np.gradient(depth, axis=0)
+    return np.asarray(0.5 * cell_px * slope, np.float32)
 
 
 def power_of_two(value: float, low: int, high: int) -> int:

@@ -101,7 +101,7 @@ def _ground_light(ground: HeightField, baker: LightBaker) -> Image:
     x, y = (grid.ravel() for grid in np.meshgrid(x, y))
     points = np.stack([x, y, ground.at(x, y)], axis=1)
     light = baker.shade(points, ground.normals(x, y)).reshape(rows, columns, 3)
-    return cv2.GaussianBlur(light, (3, 3), 0)
+    return np.asarray(cv2.GaussianBlur(light, (3, 3), 0), np.float32)
 
 
 def _rock_picture(

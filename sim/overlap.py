@@ -9,10 +9,10 @@ from __future__ import annotations
 import sys
 
 import numpy as np
-import open3d as o3d
 from numpy.typing import NDArray
 
 from sim.paths import heading_path, planar_path
+from sim.ray_caster import RayCaster
 from sim.scene import Scene, load_scene
 from sim.world import World, build_world
 
@@ -34,9 +34,7 @@ def overlap_along_flight(world: World) -> NDArray[np.float64]:
     One entry every 0.7 m of flight, as often as an aerial map appears.
     """
     scene = world.scene
-    caster = o3d.t.geometry.RaycastingScene(nthreads=2)
-    triangles = world.triangles.astype(np.uint32)
-    caster.add_triangles(world.vertices.astype(np.float32), triangles)
+    caster = RayCaster((world.vertices, world.triangles))
     shape = np.ceil(np.array(scene.room.size_m) / CELL_M).astype(int)
     first_seen = _first_seen(world, caster, shape)
     shares = []
@@ -65,7 +63,7 @@ def _flight(scene: Scene) -> tuple[NDArray, NDArray]:
     return times[keep], places[keep]
 
 
-def _first_seen(world: World, caster: o3d.t.geometry.RaycastingScene, shape: NDArray) -> NDArray:
+def _first_seen(world: World, caster: RayCaster, shape: NDArray) -> NDArray:
     """(X, Y) when the ground camera first saw each cell [s]; infinite where it never did."""
     ground = world.scene.ground
     waypoints = np.array(ground.waypoints) * [1, 1, np.pi / 180]
@@ -85,7 +83,7 @@ def _first_seen(world: World, caster: o3d.t.geometry.RaycastingScene, shape: NDA
     return first
 
 
-def _look_down(world: World, caster: o3d.t.geometry.RaycastingScene, place: NDArray) -> NDArray:
+def _look_down(world: World, caster: RayCaster, place: NDArray) -> NDArray:
     mav = world.scene.mav
     height = float(world.floor_height(*mav.start)) + mav.height_m
     focal = mav.camera_f_px / _MAV_IMAGE[0]
@@ -95,7 +93,7 @@ def _look_down(world: World, caster: o3d.t.geometry.RaycastingScene, place: NDAr
 
 
 def _cast(
-    caster: o3d.t.geometry.RaycastingScene,
+    caster: RayCaster,
     place: NDArray,
     right: NDArray,
     forward: NDArray,
@@ -110,7 +108,7 @@ def _cast(
     directions = forward + x[None, :, None] * right + y[:, None, None] * down
     rays = np.empty((rows, columns, 6), np.float32)
     rays[..., :3], rays[..., 3:] = place, directions
-    depth = caster.cast_rays(o3d.core.Tensor(rays))["t_hit"].numpy()
+    depth, _ = caster.hits(rays)
     seen = np.isfinite(depth) & (depth <= range_m)
     return place + depth[seen][:, None].astype(np.float64) * directions[seen]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+import threading
 
 import cv2
 import numpy as np
@@ -23,15 +23,20 @@ LINES = (
 )  # fmt: skip
 
 
-@cache
-def _font() -> cv2.FontFace:
-    return cv2.FontFace("sans")
+class _Fonts(threading.local):
+    """A font a thread: drawing changes the font's inner state."""
+
+    def __init__(self) -> None:
+        self.sans = cv2.FontFace("sans")
+
+
+_FONTS = _Fonts()
 
 
 def write(mask: Mask, text: str, x: float, y: float, height_px: float, weight: int = 500) -> None:
     """Write `text` with its baseline's left end at (x, y), capitals `height_px` high."""
     size = max(4, round(height_px * 1.4))
-    cv2.putText(mask, text, (round(x), round(y)), (255, 255, 255), _font(), size, weight)
+    cv2.putText(mask, text, (round(x), round(y)), (255, 255, 255), _FONTS.sans, size, weight)
 
 
 def text_mask(text: str, height_px: float, weight: int) -> Mask:
@@ -143,7 +148,7 @@ def matrix_code(side: int, rng: np.random.Generator) -> Mask:
         modules[y : y + 7, x : x + 7] = 255
         modules[y + 1 : y + 6, x + 1 : x + 6] = 0
         modules[y + 2 : y + 5, x + 2 : x + 5] = 255
-    return cv2.resize(modules, (side, side), interpolation=cv2.INTER_NEAREST)
+    return np.asarray(cv2.resize(modules, (side, side), interpolation=cv2.INTER_NEAREST), np.uint8)
 
 
 def label(width: int, height: int, rng: np.random.Generator) -> Mask:

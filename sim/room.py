@@ -101,7 +101,8 @@ def _light_map(
     normal = np.cross(half_right, half_up)
     normals = np.broadcast_to(normal / np.linalg.norm(normal), points.shape)
     light = baker.shade(points.reshape(-1, 3), normals.reshape(-1, 3))
-    return cv2.GaussianBlur(light.reshape(rows, columns, 3), (3, 3), 0)
+    smooth = cv2.GaussianBlur(light.reshape(rows, columns, 3), (3, 3), 0)
+    return np.asarray(smooth, np.float32)
 
 
 def _lit(pixels: Image, light: NDArray[np.float32]) -> NDArray[np.uint8]:

@@ -111,4 +111,4 @@ def _between(position: float, count: int) -> tuple[int, int, float]:
     """The two samples around a relative position, and how far it is toward the second."""
     exact = min(max(position * count - 0.5, 0.0), count - 1.0)
     first = int(exact)
-    return first, min(first + 1, count - 1), np.float32(exact - first)
+    return first, min(first + 1, count - 1), exact - first

@@ -84,13 +84,18 @@ def make_terrain(
     size_m: tuple[float, float], relief_m: float, rng: np.random.Generator
 ) -> HeightField:
     """Ground whose highest and lowest points lie `relief_m` apart; the origin is at z = 0."""
-    nodes = tuple(round(side / CELL_M / 2) * 2 + 1 for side in size_m)
+    nodes = (_odd(size_m[0] / CELL_M), _odd(size_m[1] / CELL_M))
     heights = np.zeros(nodes)
     for wavelength, share in _WAVES:
         heights += share * smooth_noise(nodes, wavelength / CELL_M / 2, rng)
     heights *= relief_m / np.ptp(heights)
     heights -= heights[nodes[0] // 2, nodes[1] // 2]
     return HeightField(heights, np.array(size_m))
+
+
+def _odd(cells: float) -> int:
+    """Number of nodes for about so many cells, with a node in the middle."""
+    return round(cells / 2) * 2 + 1
 
 
 def _grid_triangles(nx: int, ny: int) -> NDArray[np.int64]:

@@ -14,6 +14,7 @@ from sim.bake_light import LightBaker
 from sim.cardboard import Make
 from sim.outdoor import add_ground, add_rocks
 from sim.pictures import add_picture, paint_boxes
+from sim.print_marks import BRANDS
 from sim.rocks import scatter_rocks
 from sim.room import add_room, room_mesh
 from sim.rubble import Box, make_heap
@@ -146,7 +147,8 @@ def _add_boxes(
 ) -> None:
     """Add every box as a geom of its name, with its own six pictures if they are lit."""
     if baker and scene.rubble:
-        makes = [Make.draw(rng) for _ in range(scene.rubble.makes)]
+        names = rng.permutation(BRANDS)
+        makes = [Make.draw(rng, str(names[k % len(names)])) for k in range(scene.rubble.makes)]
         pictures = paint_boxes(boxes, makes, baker, rng)
         for box, picture in zip(boxes, pictures, strict=True):
             add_picture(spec, box.name, picture, cube=True)
