@@ -29,7 +29,7 @@ class ViewSelection(Section):
     """Depth maps within this distance of the first are fused [m]."""
     both_sides: bool = True
     """Also use the views before the reference, so that what one side hides the other sees."""
-    max_views: Count = 16
+    max_views: Annotated[int, Field(ge=1, le=40)] = 16
     """At most this many views a depth map: a view joins when it is far enough from the
     others for this many to spread over the radius."""
     min_views: Count = 5
@@ -47,21 +47,22 @@ class PlaneSweep(Section):
 
     hypotheses: Count = 200
     """Depth planes, evenly spaced in inverse depth."""
-    window_px: Count = 5
+    window_px: Count = 3
     """Side of the window over which the photometric error is averaged [px, half resolution]."""
-    truncation: Positive = 40.0
+    truncation: Annotated[float, Field(gt=0, le=100)] = 40.0
     """Absolute intensity difference above which a sample counts no more [grey levels]."""
+    one_side_penalty: Positive = 1.0
+    """With both sides: cost above which the views of the better side decide alone, the
+    other being blocked by an edge [grey levels]."""
     smoothing: Literal["none", "semiglobal"] = "semiglobal"
     """Whether costs are joined along image rows and columns before the winner is picked."""
     step_penalty: Positive = 0.5
     """Semi-global: cost of moving by one plane between neighbours [grey levels]."""
-    jump_penalty: Positive = 6.0
+    jump_penalty: Annotated[float, Field(gt=0, le=25)] = 5.0
     """Semi-global: cost of moving farther [grey levels] ..."""
-    edge_levels: Positive = 8.0
+    edge_levels: Positive = 5.0
     """... halved where the image changes by this much [grey levels]."""
-    min_uniqueness: Fraction = 0.85
-    """Best cost over the best cost elsewhere must be below this; 1 keeps everything."""
-    max_curvature_sigma_m: Positive = 0.03
+    max_curvature_sigma_m: Positive = 0.1
     """Depth is dropped where the cost's minimum is so flat that its deviation exceeds this [m]."""
 
 
@@ -70,9 +71,9 @@ class Fusion(Section):
 
     voxels: tuple[Count, Count, Count] = (376, 240, 150)
     """Size of the volume of interest [voxels]."""
-    truncation_m: Positive = 0.07
+    truncation_m: Positive = 0.06
     """Distance at which the field reaches -1 or 1 [m]."""
-    bins: Count = 8
+    bins: Annotated[int, Field(ge=2, le=8)] = 8
     """Histogram bins over [-1, 1]."""
     data_weight: Positive = 0.26
     """Lambda of Eq. 1."""
@@ -194,7 +195,7 @@ def paper() -> Config:
     return Config(
         preset="paper",
         view_selection=ViewSelection(both_sides=False),
-        plane_sweep=PlaneSweep(smoothing="none", min_uniqueness=1.0),
+        plane_sweep=PlaneSweep(window_px=5, smoothing="none"),
         fusion=Fusion(min_observations=1),
         height_maps=HeightMaps(cells_per_m=50.0),
         localization=Localization(

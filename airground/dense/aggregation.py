@@ -2,6 +2,10 @@
 
 The sum over a window is divided by the number of samples in it that some view really had,
 so that what lies outside a view neither costs nor saves anything.
+
+Beside an edge, half of the views look at something else. With the views before and after
+the reference kept apart, one half may speak alone where it agrees better than all do by
+more than a penalty; without the penalty the lower of two noisy costs would win everywhere.
 """
 
 from __future__ import annotations
@@ -19,31 +23,37 @@ MEAN_SCALE = 128.0
 ROWS_A_TASK = 12
 
 
-def aggregate(volumes: list[CostVolume], window_px: int, truncation: float) -> NDArray[np.uint16]:
-    """Mean cost over a square window and over all views of the given volumes.
+def aggregate(
+    volumes: list[CostVolume], window_px: int, truncation: float, one_side_penalty: float
+) -> NDArray[np.uint16]:
+    """Mean cost over a square window and over the views.
 
     Args:
         volumes: One or both sides of a sweep.
         window_px: Side of the window, odd.
         truncation: Cost of a sample at most, and of a place that no view covers [grey levels].
+        one_side_penalty: What the mean over one side costs more than over both [grey levels].
 
     Returns:
         (height, width, planes) uint16 in 1/128 of a grey level.
     """
     if window_px % 2 == 0:
         raise ValueError(f"window_px must be odd, got {window_px}")
+    volumes = [volume for volume in volumes if volume.limits]
+    if not volumes:
+        raise ValueError("no view was added to the sweep")
     height, planes, width = volumes[0].costs.shape
     mean = np.empty((height, width, planes), np.uint16)
     first, last = volumes[0], volumes[-1]
-    limits = np.stack([one for volume in volumes for one in volume.limits])
     box_mean(
         first.costs,
+        np.stack(first.limits),
         last.costs,
+        np.stack(last.limits),
         len(volumes) > 1,
-        limits,
         window_px // 2,
-        np.float32(MEAN_SCALE / COST_SCALE),
-        np.float32(MEAN_SCALE * truncation),
+        MEAN_SCALE * truncation,
+        MEAN_SCALE * one_side_penalty,
         mean,
     )
     return mean
@@ -51,88 +61,129 @@ def aggregate(volumes: list[CostVolume], window_px: int, truncation: float) -> N
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
 def _change_row(
-    first: NDArray,
-    last: NDArray,
-    both: bool,
-    limits: NDArray,
-    y: int,
-    sign: int,
-    sums: NDArray,
-    counts: NDArray,
-    margin: int,
+    costs: NDArray, limits: NDArray, y: int, sign: int, sums: NDArray, counts: NDArray, margin: int
 ) -> None:
     """Adds (sign 1) or takes away (sign -1) image row y from the running window sums."""
-    _, planes, width = first.shape
+    _, planes, width = costs.shape
     signed = np.int32(sign)
+    views = np.int32(sign * len(limits))
     for p in range(planes):
-        total = sums[p, margin : margin + width]
-        one = first[y, p]
+        total, count = sums[p, margin : margin + width], counts[p, margin : margin + width]
+        row = costs[y, p]
         for x in range(width):
-            total[x] += signed * np.int32(one[x])
-        if both:
-            other = last[y, p]
-            for x in range(width):
-                total[x] += signed * np.int32(other[x])
+            total[x] += signed * np.int32(row[x])
+        for x in range(width):
+            count[x] += views
+        # most views cover most of a row: take away what each does not
         for v in range(len(limits)):
-            lo, hi = limits[v, y, p, 0], limits[v, y, p, 1]
-            covered = counts[p, margin + lo : margin + hi]
-            for x in range(len(covered)):
-                covered[x] += signed
+            before, after = count[: limits[v, y, p, 0]], count[limits[v, y, p, 1] :]
+            for x in range(len(before)):
+                before[x] -= signed
+            for x in range(len(after)):
+                after[x] -= signed
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _window_sum(source: NDArray, out: NDArray, radius: int) -> None:
+    """out[x] = sum of source[x : x + 2 radius + 1]."""
+    width = len(out)
+    out[:] = 0
+    for i in range(2 * radius + 1):
+        shifted = source[i : i + width]
+        for x in range(width):
+            out[x] += shifted[x]
 
 
 @njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
 def box_mean(
     first: NDArray,
+    first_limits: NDArray,
     last: NDArray,
+    last_limits: NDArray,
     both: bool,
-    limits: NDArray,
     radius: int,
-    scale: float,
     uncovered: float,
+    penalty: float,
     mean: NDArray,
 ) -> None:
     """Fills `mean`; see `aggregate`.
 
     Args:
         first, last: (height, planes, width) uint16 summed costs; `last` counts if `both`.
+        first_limits, last_limits: (views, height, planes, 2) int16, columns [lo, hi) that a
+            view covers.
         both: Whether there are two volumes.
-        limits: (views, height, planes, 2) int16 columns [lo, hi) that a view covers.
         radius: The window is 2 radius + 1 wide and high.
-        scale: From stored sums to stored means.
         uncovered: Stored mean where no view covers the window.
+        penalty: Stored mean that one side alone costs more.
         mean: (height, width, planes) uint16, filled.
     """
     height, planes, width = first.shape
-    tasks = (height + ROWS_A_TASK - 1) // ROWS_A_TASK
-    for task in prange(tasks):
+    factor = np.float32(MEAN_SCALE / COST_SCALE)
+    ceiling, alone = np.float32(uncovered), np.float32(penalty)
+    padded = width + 2 * radius
+    for task in prange((height + ROWS_A_TASK - 1) // ROWS_A_TASK):
         begin = task * ROWS_A_TASK
         end = min(begin + ROWS_A_TASK, height)
-        sums = np.zeros((planes, width + 2 * radius), np.int32)
-        counts = np.zeros((planes, width + 2 * radius), np.int32)
-        total = np.empty(width, np.int32)
-        count = np.empty(width, np.int32)
+        sums = np.zeros((2, planes, padded), np.int32)
+        counts = np.zeros((2, planes, padded), np.int32)
+        total, count = np.empty((2, width), np.int32), np.empty((2, width), np.int32)
         block = np.empty((planes, width), np.uint16)
         for y in range(max(begin - radius, 0), min(begin + radius, height)):
-            _change_row(first, last, both, limits, y, 1, sums, counts, radius)
+            _change_row(first, first_limits, y, 1, sums[0], counts[0], radius)
+            if both:
+                _change_row(last, last_limits, y, 1, sums[1], counts[1], radius)
         for y in range(begin, end):
             if y + radius < height:
-                _change_row(first, last, both, limits, y + radius, 1, sums, counts, radius)
+                _change_row(first, first_limits, y + radius, 1, sums[0], counts[0], radius)
+                if both:
+                    _change_row(last, last_limits, y + radius, 1, sums[1], counts[1], radius)
             for p in range(planes):
-                total[:] = 0
-                count[:] = 0
-                for i in range(2 * radius + 1):
-                    some, seen = sums[p, i : i + width], counts[p, i : i + width]
-                    for x in range(width):
-                        total[x] += some[x]
-                        count[x] += seen[x]
-                out = block[p]
-                for x in range(width):
-                    n = np.float32(max(count[x], np.int32(1)))
-                    value = scale * np.float32(total[x]) / n
-                    out[x] = np.uint16(np.int32(value if count[x] > 0 else uncovered))
+                _window_sum(sums[0, p], total[0], radius)
+                _window_sum(counts[0, p], count[0], radius)
+                if both:
+                    _window_sum(sums[1, p], total[1], radius)
+                    _window_sum(counts[1, p], count[1], radius)
+                    _mean_of_sides(total, count, factor, ceiling, alone, block[p])
+                else:
+                    _mean(total[0], count[0], factor, ceiling, block[p])
             _transpose(block, mean[y])
             if y - radius >= 0:
-                _change_row(first, last, both, limits, y - radius, -1, sums, counts, radius)
+                _change_row(first, first_limits, y - radius, -1, sums[0], counts[0], radius)
+                if both:
+                    _change_row(last, last_limits, y - radius, -1, sums[1], counts[1], radius)
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _mean(
+    total: NDArray, count: NDArray, factor: np.float32, ceiling: np.float32, out: NDArray
+) -> None:
+    """Sum over number of samples, as stored."""
+    for x in range(len(out)):
+        value = factor * np.float32(total[x]) / np.float32(max(count[x], np.int32(1)))
+        out[x] = np.uint16(np.int32(value if count[x] > 0 else ceiling))
+
+
+@njit(cache=True, error_model="numpy", fastmath=FAST)
+def _mean_of_sides(
+    total: NDArray,
+    count: NDArray,
+    factor: np.float32,
+    ceiling: np.float32,
+    alone: np.float32,
+    out: NDArray,
+) -> None:
+    """The mean over both sides, or over the better one plus a penalty, whichever is lower."""
+    one = np.int32(1)
+    total0, total1, count0, count1 = total[0], total[1], count[0], count[1]
+    for x in range(len(out)):
+        n0, n1 = count0[x], count1[x]
+        sum0, sum1 = factor * np.float32(total0[x]), factor * np.float32(total1[x])
+        mean0 = sum0 / np.float32(max(n0, one)) if n0 > 0 else ceiling
+        mean1 = sum1 / np.float32(max(n1, one)) if n1 > 0 else ceiling
+        n = np.float32(n0) + np.float32(n1)
+        value = (sum0 + sum1) / max(n, np.float32(1)) if n > 0 else ceiling
+        out[x] = np.uint16(np.int32(min(value, min(mean0, mean1) + alone)))
 
 
 @njit(cache=True, error_model="numpy")

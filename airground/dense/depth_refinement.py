@@ -16,8 +16,6 @@ FAST = {"contract", "reassoc", "arcp", "nsz"}
 PARABOLA_REACH = 3
 """The parabola goes through the winner and the costs this many planes away: the planes are
 finer than the cost's minimum is wide, so that next neighbours would mostly show noise."""
-ELSEWHERE = 10
-"""Planes this close to the winner are the same minimum."""
 NOISE_OF_COST = 0.03
 """Standard deviation of an aggregated cost as a share of it (set on synthetic heaps)."""
 SPECKLE_PX = 60
@@ -32,20 +30,20 @@ def depth_from_costs(sweep: PlaneSweep, parameters: Parameters) -> NDArray[np.fl
     Returns:
         (height, width) float32 [m], NaN where the depth is uncertain.
     """
-    mean = aggregate(sweep.volumes, parameters.window_px, parameters.truncation)
+    mean = aggregate(
+        sweep.volumes, parameters.window_px, parameters.truncation, parameters.one_side_penalty
+    )
     costs = mean
     if parameters.smoothing == "semiglobal":
         costs = smooth(mean, sweep.reference, parameters)
     inverse = 1.0 / sweep.depths
     shape = mean.shape[:2]
-    plane, ratio, sigma = (np.empty(shape, np.float32) for _ in range(3))
-    pick(costs, mean, plane, ratio, sigma)
+    plane, sigma = np.empty(shape, np.float32), np.empty(shape, np.float32)
+    pick(costs, mean, plane, sigma)
     depth = 1.0 / (inverse[0] + plane * (inverse[1] - inverse[0]))
     sigma_m = sigma * depth**2 * abs(inverse[1] - inverse[0])
     # comparisons with NaN are false: what has no minimum is dropped here
-    believed = (ratio <= parameters.min_uniqueness) | (parameters.min_uniqueness >= 1)
-    believed &= sigma_m <= parameters.max_curvature_sigma_m
-    believed &= np.isfinite(plane)
+    believed = sigma_m <= parameters.max_curvature_sigma_m
     believed &= ~_speckles(np.where(believed, plane, np.nan))
     return np.where(believed, depth, np.nan).astype(np.float32)
 
@@ -59,14 +57,13 @@ def _speckles(plane: NDArray[np.float32]) -> NDArray[np.bool_]:
 
 
 @njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
-def pick(costs: NDArray, mean: NDArray, plane: NDArray, ratio: NDArray, sigma: NDArray) -> None:
+def pick(costs: NDArray, mean: NDArray, plane: NDArray, sigma: NDArray) -> None:
     """The winning plane of each pixel, its sub-plane position and how sure it is.
 
     Args:
         costs: (height, width, planes) uint16: the winner has the lowest.
         mean: (height, width, planes) uint16: the plain mean costs.
         plane: (height, width) float32, filled: sub-plane index, NaN at either end.
-        ratio: Filled: the winner's mean cost over the best mean cost elsewhere.
         sigma: Filled: standard deviation of the index by the noise of the mean cost.
     """
     height, width, planes = costs.shape
@@ -80,7 +77,7 @@ def pick(costs: NDArray, mean: NDArray, plane: NDArray, ratio: NDArray, sigma: N
             winner = 0
             while line[winner] != best:
                 winner += 1
-            plane[y, x], ratio[y, x], sigma[y, x] = np.nan, np.nan, np.nan
+            plane[y, x], sigma[y, x] = np.nan, np.nan
             if winner < reach or winner >= planes - reach:
                 continue
             before, after = np.float32(line[winner - reach]), np.float32(line[winner + reach])
@@ -89,14 +86,7 @@ def pick(costs: NDArray, mean: NDArray, plane: NDArray, ratio: NDArray, sigma: N
             if bend > 0:
                 offset = np.float32(0.5) * (before - after) / bend
             plane[y, x] = winner + reach * min(max(offset, np.float32(-1)), np.float32(1))
-            elsewhere = np.uint16(65535)
-            for p in range(max(winner - ELSEWHERE, 0)):
-                elsewhere = min(elsewhere, raw[p])
-            far = raw[min(winner + ELSEWHERE + 1, planes) :]
-            for p in range(len(far)):
-                elsewhere = min(elsewhere, far[p])
             here = np.float32(raw[winner])
-            ratio[y, x] = here / max(np.float32(elsewhere), np.float32(1))
             bend = np.float32(raw[winner - reach]) + np.float32(raw[winner + reach]) - 2 * here
             noise = np.float32(NOISE_OF_COST * 0.7071) * (here + np.float32(128))
             sigma[y, x] = reach * noise / bend if bend > 0 else np.float32(np.inf)

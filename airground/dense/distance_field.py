@@ -2,8 +2,9 @@
 
 A depth map gives a voxel the value f = (depth seen there - depth of the voxel) / truncation,
 cut to [-1, 1]: positive before the surface, negative behind it. A voxel farther behind the
-surface than the truncation is hidden: it gets no vote. The eight counts of a voxel are
-packed into one 32-bit word, four bits each, so that a surface takes at most 15 depth maps.
+surface than the truncation is hidden: it gets no vote. The counts of a voxel, one a
+bin, are packed into one 32-bit word, four bits each: a histogram has at most 8 bins and
+takes at most 15 depth maps.
 """
 
 from __future__ import annotations
@@ -16,13 +17,13 @@ from airground.core.surface import DepthMap
 from airground.dense.volume import Volume
 
 FAST = {"contract", "reassoc", "arcp", "nsz"}
-BINS = 8
+MAX_BINS = 8
 MAX_DEPTH_MAPS = 15
 
 
-def bin_centres() -> NDArray[np.float64]:
-    """(BINS,) the values c_j that the bins stand for, evenly spaced in [-1, 1]."""
-    return (2 * np.arange(BINS) + 1) / BINS - 1.0
+def bin_centres(bins: int) -> NDArray[np.float64]:
+    """(bins,) the values c_j that the bins stand for, evenly spaced in [-1, 1]."""
+    return (2 * np.arange(bins) + 1) / bins - 1.0
 
 
 class FieldHistogram:
@@ -31,15 +32,23 @@ class FieldHistogram:
     Attributes:
         volume: The voxels.
         truncation_m: Distance at which the field reaches -1 or 1.
+        bins: How many bins, at most 8.
         counts: (rows, planes, columns) uint32, bin j in bits 4 j to 4 j + 3.
         depth_maps: How many depth maps went in.
     """
 
     def __init__(
-        self, volume: Volume, truncation_m: float, memory: NDArray[np.uint32] | None = None
+        self,
+        volume: Volume,
+        truncation_m: float,
+        bins: int = MAX_BINS,
+        memory: NDArray[np.uint32] | None = None,
     ) -> None:
+        if not 2 <= bins <= MAX_BINS:
+            raise ValueError(f"a histogram has 2 to {MAX_BINS} bins, got {bins}")
         self.volume = volume
         self.truncation_m = truncation_m
+        self.bins = bins
         if memory is None or memory.shape != volume.shape:
             memory = np.empty(volume.shape, np.uint32)
         memory.fill(0)
@@ -68,7 +77,8 @@ class FieldHistogram:
             matrix.astype(np.float32),
             shift.astype(np.float32),
             volume.depths().astype(np.float32),
-            np.float32(1.0 / self.truncation_m),
+            1.0 / self.truncation_m,
+            self.bins,
         )
         self.depth_maps += 1
 
@@ -83,6 +93,7 @@ def add_field(
     shift: NDArray,
     plane_depths: NDArray,
     inverse_truncation: float,
+    bins: int,
 ) -> None:
     """Adds one vote at every voxel that the depth map sees, in its nearest pixel.
 
@@ -94,10 +105,12 @@ def add_field(
             pixel z_k matrix (x, y, 1) + shift of the depth map.
         plane_depths: (planes,) float32.
         inverse_truncation: [1/m].
+        bins: Number of bins.
     """
     rows, planes, columns = counts.shape
     outside = width * height
     half, one = np.float32(0.5), np.float32(1.0)
+    per_metre, levels = np.float32(inverse_truncation), np.float32(0.5 * bins)
     for y in prange(rows):
         index = np.empty(columns, np.int32)
         z = np.empty(columns, np.float32)
@@ -122,8 +135,8 @@ def add_field(
                 seen[x] = depth[index[x]]
             row = counts[y, k]
             for x in range(columns):
-                value = (seen[x] - z[x]) * inverse_truncation
+                value = (seen[x] - z[x]) * per_metre
                 visible = value >= -one
-                level = (min(value, np.float32(0.999)) + one) * np.float32(BINS / 2)
+                level = (min(value, np.float32(0.999)) + one) * levels
                 bits = np.uint32(4) * np.uint32(level if visible else np.float32(0))
                 row[x] = np.uint32(row[x]) + (np.uint32(visible) << bits)

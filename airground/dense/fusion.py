@@ -12,8 +12,10 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from airground.dense.distance_field import MAX_BINS
+
 FAST = {"contract", "reassoc", "arcp", "nsz"}
-STEP = 1.0 / np.sqrt(12.0)
+STEP = 12.0**-0.5
 """Primal and dual step; the squared norm of the 3-d gradient is at most 12."""
 UNSEEN = -1.0
 """Where no depth map sees anything, phi starts behind the surface."""
@@ -22,9 +24,10 @@ UNSEEN = -1.0
 class Fusion:
     """Minimizes Eq. 1; keeps its working memory from one surface to the next."""
 
-    def __init__(self, data_weight: float, iterations: int) -> None:
+    def __init__(self, data_weight: float, iterations: int, bins: int = MAX_BINS) -> None:
         self.data_weight = data_weight
         self.iterations = iterations
+        self.spacing = 2.0 / bins
         self._memory: NDArray[np.float32] | None = None
 
     def fuse(self, counts: NDArray[np.uint32]) -> NDArray[np.float32]:
@@ -38,21 +41,27 @@ class Fusion:
         """
         if self._memory is None or self._memory.shape[1:] != counts.shape:
             self._memory = np.empty((5, *counts.shape), np.float32)
-        phi, ahead, *dual = self._memory
-        start(counts, phi, ahead, *dual)
-        weight = np.float32(STEP * self.data_weight)
+        phi, ahead, dy, dk, dx = self._memory
+        start(counts, self.spacing, phi, ahead, dy, dk, dx)
         for _ in range(self.iterations):
-            dual_step(ahead, *dual, np.float32(STEP))
-            primal_step(counts, phi, ahead, *dual, np.float32(STEP), weight)
+            dual_step(ahead, dy, dk, dx, STEP)
+            primal_step(counts, self.spacing, phi, ahead, dy, dk, dx, STEP, STEP * self.data_weight)
         return phi
 
 
 @njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
 def start(
-    counts: NDArray, phi: NDArray, ahead: NDArray, dy: NDArray, dk: NDArray, dx: NDArray
+    counts: NDArray,
+    spacing: float,
+    phi: NDArray,
+    ahead: NDArray,
+    dy: NDArray,
+    dk: NDArray,
+    dx: NDArray,
 ) -> None:
     """phi at the mean of its histogram, the dual at zero."""
     rows, planes, columns = counts.shape
+    width = np.float32(spacing)
     for y in prange(rows):
         for k in range(planes):
             word, out, copy = counts[y, k], phi[y, k], ahead[y, k]
@@ -63,7 +72,7 @@ def start(
                     votes += n
                     total += n * np.uint32(j)
                 many = np.float32(max(votes, np.uint32(1)))
-                mean = (np.float32(2) * np.float32(total) / many + np.float32(1)) / np.float32(8)
+                mean = (np.float32(total) / many + np.float32(0.5)) * width
                 value = mean - np.float32(1) if votes > 0 else np.float32(UNSEEN)
                 out[x] = value
                 copy[x] = value
@@ -76,7 +85,7 @@ def start(
 def dual_step(ahead: NDArray, dy: NDArray, dk: NDArray, dx: NDArray, step: float) -> None:
     """p <- project(p + sigma grad phi_ahead) onto the unit ball."""
     rows, planes, columns = ahead.shape
-    one = np.float32(1)
+    one, sigma = np.float32(1), np.float32(step)
     for y in prange(rows):
         below = min(np.int64(y) + 1, rows - 1)
         for k in range(planes):
@@ -85,16 +94,16 @@ def dual_step(ahead: NDArray, dy: NDArray, dk: NDArray, dx: NDArray, step: float
             a, b, c = dy[y, k], dk[y, k], dx[y, k]
             right = here[1:]
             for x in range(columns - 1):
-                u = a[x] + step * (down[x] - here[x])
-                v = b[x] + step * (deep[x] - here[x])
-                w = c[x] + step * (right[x] - here[x])
+                u = a[x] + sigma * (down[x] - here[x])
+                v = b[x] + sigma * (deep[x] - here[x])
+                w = c[x] + sigma * (right[x] - here[x])
                 shrink = one / max(one, np.sqrt(u * u + v * v + w * w))
                 a[x] = u * shrink
                 b[x] = v * shrink
                 c[x] = w * shrink
             x = columns - 1
-            u = a[x] + step * (down[x] - here[x])
-            v = b[x] + step * (deep[x] - here[x])
+            u = a[x] + sigma * (down[x] - here[x])
+            v = b[x] + sigma * (deep[x] - here[x])
             shrink = one / max(one, np.sqrt(u * u + v * v))
             a[x] = u * shrink
             b[x] = v * shrink
@@ -103,6 +112,7 @@ def dual_step(ahead: NDArray, dy: NDArray, dk: NDArray, dx: NDArray, step: float
 @njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
 def primal_step(
     counts: NDArray,
+    spacing: float,
     phi: NDArray,
     ahead: NDArray,
     dy: NDArray,
@@ -115,10 +125,12 @@ def primal_step(
 
     The prox of tau lambda sum_j n_j |phi - c_j| at v is
     max over k = 0..8 of min(v + tau lambda W_k, c_{k+1}) with W_0 = N, W_k = W_{k-1} - 2 n_k
-    and c_9 = inf: the k-th term is the solution if it lies between c_k and c_{k+1}.
+    and c_9 = inf: the k-th term is the solution if it lies between c_k and c_{k+1}. With
+    fewer than eight bins the rest stay empty and add no kink.
     """
     rows, planes, columns = phi.shape
     zero = np.zeros(columns, np.float32)
+    tau, data_weight, width = np.float32(step), np.float32(weight), np.float32(spacing)
     for y in prange(rows):
         shifted = np.empty(columns, np.float32)
         for k in range(planes):
@@ -126,43 +138,54 @@ def primal_step(
             a_before = dy[np.int64(y) - 1, k] if y > 0 else zero
             b_before = dk[y, k - 1] if k > 0 else zero
             old, extrapolated, word = phi[y, k], ahead[y, k], counts[y, k]
-            shifted[0] = old[0] + step * (a[0] - a_before[0] + b[0] - b_before[0] + c[0])
+            shifted[0] = old[0] + tau * (a[0] - a_before[0] + b[0] - b_before[0] + c[0])
             for x in range(1, columns):
                 divergence = a[x] - a_before[x] + b[x] - b_before[x] + c[x] - c[x - 1]
-                shifted[x] = old[x] + step * divergence
+                shifted[x] = old[x] + tau * divergence
             for x in range(columns):
-                value = prox(shifted[x], np.uint32(word[x]), weight)
+                value = prox(shifted[x], np.uint32(word[x]), data_weight, width)
                 extrapolated[x] = value + value - old[x]
                 old[x] = value
 
 
+@njit(cache=True, inline="always")
+def _count(word: np.uint32, bits: int) -> np.float32:
+    """One of the eight counts as float32: mixed with integers, they would widen to 64 bits."""
+    return np.float32(np.int32(np.uint32(np.uint32(word) >> np.uint32(bits)) & np.uint32(15)))
+
+
 @njit(cache=True, inline="always", error_model="numpy", fastmath=FAST)
-def prox(v: float, word: int, weight: float) -> float:
-    """argmin over u of (u - v)^2 / 2 + weight sum_j n_j |u - c_j|, for packed counts."""
-    four, mask = np.uint32(4), np.uint32(15)
-    n0 = np.int32(word & mask)
-    n1 = np.int32((word >> four) & mask)
-    n2 = np.int32((word >> np.uint32(8)) & mask)
-    n3 = np.int32((word >> np.uint32(12)) & mask)
-    n4 = np.int32((word >> np.uint32(16)) & mask)
-    n5 = np.int32((word >> np.uint32(20)) & mask)
-    n6 = np.int32((word >> np.uint32(24)) & mask)
-    n7 = np.int32(word >> np.uint32(28))
-    w = n0 + n1 + n2 + n3 + n4 + n5 + n6 + n7
-    u = min(v + weight * np.float32(w), np.float32(-0.875))
-    w -= 2 * n0
-    u = max(u, min(v + weight * np.float32(w), np.float32(-0.625)))
-    w -= 2 * n1
-    u = max(u, min(v + weight * np.float32(w), np.float32(-0.375)))
-    w -= 2 * n2
-    u = max(u, min(v + weight * np.float32(w), np.float32(-0.125)))
-    w -= 2 * n3
-    u = max(u, min(v + weight * np.float32(w), np.float32(0.125)))
-    w -= 2 * n4
-    u = max(u, min(v + weight * np.float32(w), np.float32(0.375)))
-    w -= 2 * n5
-    u = max(u, min(v + weight * np.float32(w), np.float32(0.625)))
-    w -= 2 * n6
-    u = max(u, min(v + weight * np.float32(w), np.float32(0.875)))
-    w -= 2 * n7
-    return max(u, v + weight * np.float32(w))
+def prox(v: np.float32, word: np.uint32, weight: np.float32, spacing: np.float32) -> np.float32:
+    """argmin over u of (u - v)^2 / 2 + weight sum_j n_j |u - c_j|, for packed counts.
+
+    The centres are c_j = spacing (j + 1/2) - 1, j = 0..7.
+    """
+    n0, n1, n2, n3 = _count(word, 0), _count(word, 4), _count(word, 8), _count(word, 12)
+    n4, n5, n6, n7 = _count(word, 16), _count(word, 20), _count(word, 24), _count(word, 28)
+    w = weight * (n0 + n1 + n2 + n3 + n4 + n5 + n6 + n7)
+    two = weight + weight
+    centre = np.float32(0.5) * spacing - np.float32(1)
+    u = min(v + w, centre)
+    w -= two * n0
+    centre += spacing
+    u = max(u, min(v + w, centre))
+    w -= two * n1
+    centre += spacing
+    u = max(u, min(v + w, centre))
+    w -= two * n2
+    centre += spacing
+    u = max(u, min(v + w, centre))
+    w -= two * n3
+    centre += spacing
+    u = max(u, min(v + w, centre))
+    w -= two * n4
+    centre += spacing
+    u = max(u, min(v + w, centre))
+    w -= two * n5
+    centre += spacing
+    u = max(u, min(v + w, centre))
+    w -= two * n6
+    centre += spacing
+    u = max(u, min(v + w, centre))
+    w -= two * n7
+    return max(u, v + w)

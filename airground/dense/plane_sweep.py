@@ -70,7 +70,7 @@ class TurnedView:
         height, width = camera.height // 2, camera.width // 2
         mean = cv2.boxFilter(turned, -1, (2, 2), anchor=(0, 0), borderType=cv2.BORDER_REPLICATE)
         blocks = mean[: 2 * height, : 2 * width].reshape(height, 2, width, 2)
-        phases = np.ascontiguousarray(blocks.transpose(1, 0, 3, 2))
+        phases = np.ascontiguousarray(blocks.transpose(1, 0, 3, 2), np.float32)
         return cls(phases, _row_limits(inside == 255)[: 2 * height])
 
     def scaled(self, gain: float) -> TurnedView:

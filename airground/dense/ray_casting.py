@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from airground.core.cloud import PointCloud
 from airground.core.surface import DepthMap
+from airground.dense.distance_field import MAX_BINS
 from airground.dense.volume import Volume
 
 FAST = {"contract", "reassoc", "arcp", "nsz"}
@@ -18,6 +19,8 @@ def cast_surface(
     phi: NDArray[np.float32],
     counts: NDArray[np.uint32],
     min_observations: int,
+    truncation_m: float,
+    bins: int = MAX_BINS,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Depth and normals of the surface in the volume's own view.
 
@@ -27,6 +30,10 @@ def cast_surface(
         counts: (rows, planes, columns) uint32, the packed histogram.
         min_observations: Depth maps that must have voted for a surface close to the point
             (within the truncation), or there is no point.
+        truncation_m: Distance at which phi reaches -1 or 1. Phi stands on the centres of
+            the bins, so that its crossing alone is known to a voxel only; the zero of the
+            line fitted to the voxels within half the truncation is known far better.
+        bins: Of the histogram.
 
     Returns:
         Depth (rows, columns) float32 [m], NaN where there is no surface, and unit normals
@@ -37,7 +44,9 @@ def cast_surface(
     normals = np.full((height, width, 3), np.nan, np.float32)
     camera = volume.camera
     intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
-    scan(phi, counts, volume.depths(), intrinsics, min_observations, depth, normals)
+    planes = volume.depths()
+    reach = max(1, int(0.5 * truncation_m / (planes[1] - planes[0])))
+    scan(phi, counts, planes, intrinsics, min_observations, reach, bins, depth, normals)
     return depth, normals
 
 
@@ -60,12 +69,40 @@ def surface_cloud(
 
 
 @njit(cache=True, inline="always")
-def _votes_near_surface(word: int) -> int:
+def _votes_near_surface(word: int, bins: int) -> int:
     """Votes in all bins but the last, which says "free"."""
     votes = 0
-    for j in range(7):
+    for j in range(bins - 1):
         votes += (word >> (4 * j)) & 15
     return votes
+
+
+@njit(cache=True, error_model="numpy")
+def _line_zero(column: NDArray, k: int, reach: int, crossing: float) -> float:
+    """Where the line fitted to phi around a crossing is zero, in planes behind plane k.
+
+    Args:
+        column: (planes,) phi along a ray.
+        k: The last plane before the crossing.
+        reach: Planes k + 1 - reach to k + reach are fitted.
+        crossing: The plain linear interpolation, which is kept where phi is no falling
+            line: within another surface's reach, or at the volume's end.
+    """
+    if k + 1 - reach < 0 or k + reach >= len(column):
+        return crossing
+    total, moment, square = 0.0, 0.0, 0.0
+    before = column[k + 1 - reach]
+    for i in range(1 - reach, reach + 1):
+        value = column[k + i]
+        if value > before:
+            return crossing
+        before = value
+        offset = i - 0.5
+        total += value
+        moment += offset * value
+        square += offset * offset
+    zero = 0.5 - (total / (2 * reach)) / (moment / square)
+    return zero if abs(zero - crossing) <= 1.5 else crossing
 
 
 @njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
@@ -75,6 +112,8 @@ def scan(
     plane_depths: NDArray,
     intrinsics: NDArray,
     min_observations: int,
+    reach: int,
+    bins: int,
     depth: NDArray,
     normals: NDArray,
 ) -> None:
@@ -82,7 +121,8 @@ def scan(
     rows, planes, columns = phi.shape
     fx, fy, cx, cy = intrinsics
     for y in prange(rows):
-        up, down = max(np.int64(y) - 1, 0), min(np.int64(y) + 1, rows - 1)
+        row = np.int64(y)
+        up, down = row - 1 if row > 0 else row, row + 1 if row + 1 < rows else row
         open_columns = np.ones(columns, np.bool_)
         for k in range(planes - 1):
             here, behind = phi[y, k], phi[y, k + 1]
@@ -95,17 +135,18 @@ def scan(
                 if not (open_columns[x] and here[x] > 0 and behind[x] <= 0):
                     continue
                 votes = max(
-                    _votes_near_surface(int(counts[y, k, x])),
-                    _votes_near_surface(int(counts[y, k + 1, x])),
+                    _votes_near_surface(int(counts[y, k, x]), bins),
+                    _votes_near_surface(int(counts[y, k + 1, x]), bins),
                 )
                 if votes < min_observations:
                     continue
                 open_columns[x] = False
-                fraction = here[x] / (here[x] - behind[x])
+                crossing = here[x] / (here[x] - behind[x])
+                fraction = _line_zero(phi[y, :, x], k, reach, crossing)
                 z = plane_depths[k] + fraction * (plane_depths[k + 1] - plane_depths[k])
                 depth[y, x] = z
                 left, right = max(x - 1, 0), min(x + 1, columns - 1)
-                near = k if fraction < 0.5 else k + 1
+                near = k if crossing < 0.5 else k + 1
                 k0, k1 = max(k - 1, 0), min(k + 2, planes - 1)
                 gx = (phi[y, near, right] - phi[y, near, left]) / (right - left)
                 gy = (phi[down, near, x] - phi[up, near, x]) / (down - up)

@@ -52,7 +52,9 @@ class DenseReconstruction:
         self._last_reference: PosedImage | None = None
         self._open: list[tuple[ViewSet, PlaneSweep]] = []
         self._depth_maps: list[DepthMap] = []
-        self._fusion = Fusion(config.fusion.data_weight, config.fusion.iterations)
+        self._fusion = Fusion(
+            config.fusion.data_weight, config.fusion.iterations, config.fusion.bins
+        )
         self._counts: NDArray[np.uint32] | None = None
         self._newest_ns = 0
 
@@ -137,7 +139,7 @@ class DenseReconstruction:
         if not self._depth_maps:
             return False
         first = self._depth_maps[0].T_mav_camera.translation
-        distance = np.linalg.norm(depth_map.T_mav_camera.translation - first)
+        distance = float(np.linalg.norm(depth_map.T_mav_camera.translation - first))
         return (
             distance > self.config.view_selection.fusion_radius_m
             or len(self._depth_maps) >= MAX_DEPTH_MAPS
@@ -151,17 +153,22 @@ class DenseReconstruction:
         if len(depth_maps) < parameters.min_depth_maps:
             return
         reference = depth_maps[len(depth_maps) // 2]
-        volume = Volume.around(
-            depth_maps, reference, parameters.voxels, 2 * parameters.truncation_m
-        )
-        histogram = FieldHistogram(volume, parameters.truncation_m, self._counts)
+        volume = Volume.around(depth_maps, reference, parameters.voxels, parameters.truncation_m)
+        histogram = FieldHistogram(volume, parameters.truncation_m, parameters.bins, self._counts)
         self._counts = histogram.counts
         for depth_map in depth_maps:
             histogram.add(depth_map)
             yield FieldAdded(self._newest_ns)
         phi = self._fusion.fuse(histogram.counts)
         yield VolumeFused(self._newest_ns)
-        depth, normals = cast_surface(volume, phi, histogram.counts, parameters.min_observations)
+        depth, normals = cast_surface(
+            volume,
+            phi,
+            histogram.counts,
+            parameters.min_observations,
+            parameters.truncation_m,
+            parameters.bins,
+        )
         surface = AerialSurface(
             self._newest_ns,
             reference.stamp_ns,

@@ -72,7 +72,7 @@ def triangulated_depths(
 
 
 def _track(start: NDArray, end: NDArray, corners: NDArray) -> tuple[NDArray, NDArray[np.bool_]]:
-    moved, status, _ = cv2.calcOpticalFlowPyrLK(
+    moved, status, _ = cv2.calcOpticalFlowPyrLK(  # type: ignore[call-overload]
         start, end, corners, None, winSize=(15, 15), maxLevel=4
     )
     return moved, status[:, 0] == 1

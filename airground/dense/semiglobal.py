@@ -35,13 +35,10 @@ def smooth(
         plane before, so that they stay below cost + jump penalty and the sum fits.
     """
     total = np.zeros_like(mean)
-    penalties = (
-        np.float32(MEAN_SCALE * parameters.step_penalty),
-        np.float32(MEAN_SCALE * parameters.jump_penalty),
-        np.float32(parameters.edge_levels),
-    )
-    along_rows(mean, reference, *penalties, total)
-    along_columns(mean, reference, *penalties, total)
+    step = int(MEAN_SCALE * parameters.step_penalty)
+    jump, edge = MEAN_SCALE * parameters.jump_penalty, parameters.edge_levels
+    along_rows(mean, reference, step, jump, edge, total)
+    along_columns(mean, reference, step, jump, edge, total)
     return total
 
 
@@ -65,14 +62,14 @@ def _extend(
 
 
 @njit(cache=True, error_model="numpy")
-def _jump(step: float, jump: float, edge: float, here: float, before: float) -> int:
+def _jump(step: int, jump: float, edge: float, here: float, before: float) -> int:
     """The jump penalty between two neighbours, lower across an edge of the image."""
-    return np.int32(max(jump / (np.float32(1) + abs(here - before) / edge), step))
+    return max(int(jump / (1.0 + abs(here - before) / edge)), step)
 
 
 @njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
 def along_rows(
-    mean: NDArray, image: NDArray, step: float, jump: float, edge: float, total: NDArray
+    mean: NDArray, image: NDArray, step: int, jump: float, edge: float, total: NDArray
 ) -> None:
     """Adds the paths from the left and from the right."""
     height, width, planes = mean.shape
@@ -90,14 +87,14 @@ def along_rows(
                     paths[i & 1],
                     paths[(i + 1) & 1],
                     total[y, x],
-                    np.int32(step),
+                    step,
                     penalty,
                 )
 
 
 @njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
 def along_columns(
-    mean: NDArray, image: NDArray, step: float, jump: float, edge: float, total: NDArray
+    mean: NDArray, image: NDArray, step: int, jump: float, edge: float, total: NDArray
 ) -> None:
     """Adds the paths from the top and from the bottom."""
     height, width, planes = mean.shape
@@ -119,6 +116,6 @@ def along_columns(
                         paths[i & 1, c],
                         paths[(i + 1) & 1, c],
                         total[y, x],
-                        np.int32(step),
+                        step,
                         penalty,
                     )
