@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -36,8 +37,10 @@ def make_frames(plan: FramePlan, workers: int) -> Iterator[list[Written]]:
             for task in tasks:
                 yield _make(maker, task)
         return
+    workers = min(workers, len(tasks))
+    threads = max(len(os.sched_getaffinity(0)) // workers, 1)
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(min(workers, len(tasks)), context, _start_worker, (plan,))
+    pool = ProcessPoolExecutor(workers, context, _start_worker, (plan, threads))
     try:
         for future in as_completed([pool.submit(_work, task) for task in tasks]):
             yield future.result()
@@ -68,8 +71,9 @@ def _make(maker: FrameMaker, task: Task) -> list[Written]:
 _maker: FrameMaker | None = None  # one a process
 
 
-def _start_worker(plan: FramePlan) -> None:
+def _start_worker(plan: FramePlan, threads: int) -> None:
     global _maker
+    os.environ.setdefault("LP_NUM_THREADS", str(threads))  # of Mesa's software renderer
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent to handle
     cv2.setNumThreads(1)
     _maker = FrameMaker(plan)

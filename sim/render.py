@@ -6,6 +6,7 @@ y up, ours (OpenCV) along +z with y down.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from types import TracebackType
 
@@ -39,13 +40,7 @@ class Renderer:
         self._scene = mujoco.MjvScene(self._model, maxgeom=self._model.ngeom + 100)
         self._option = mujoco.MjvOption()
         visual = self._model.vis.global_
-        try:
-            self._window = mujoco.GLContext(visual.offwidth, visual.offheight)
-            self._window.make_current()
-        except Exception as error:  # each backend has its own kinds
-            raise AirgroundError(
-                f"cannot draw without a screen ({error}); `airground doctor` says what is missing"
-            ) from error
+        self._window = _open_window(visual.offwidth, visual.offheight)
         self._context = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
         self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
@@ -121,6 +116,23 @@ class Renderer:
         depth = (far * near / (far - near)) / (stored + near / (far - near))
         depth[stored == 0] = np.nan
         return depth
+
+
+def _open_window(width: int, height: int) -> mujoco.GLContext:
+    """A current graphics context without a screen."""
+    egl = sys.modules.get("mujoco.egl")
+    if egl is not None:
+        # pyrender shuts the shared display down when it is done; have it opened again.
+        egl.EGL_DISPLAY = None  # type: ignore[attr-defined]
+    try:
+        window = mujoco.GLContext(width, height)
+        window.make_current()
+    except Exception as error:  # each backend has its own kinds
+        reason = (str(error) or type(error).__name__).splitlines()[0]
+        raise AirgroundError(
+            f"cannot draw without a screen ({reason}); `airground doctor` says what is missing"
+        ) from error
+    return window
 
 
 def with_cameras(spec: mujoco.MjSpec, cameras: Mapping[str, PinholeCamera]) -> mujoco.MjModel:

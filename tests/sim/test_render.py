@@ -39,10 +39,6 @@ def test_depth_is_that_of_ray_casting(heap: Heap, depths: dict, name: str) -> No
     assert_same_depth(depths[name], cast)
 
 
-# Deleting a renderer of pyrender shuts the display down that MuJoCo draws on, too.
-KEPT_OPEN: list[pyrender.OffscreenRenderer] = []
-
-
 def one_sample_per_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
     """pyrender's antialiasing would move the samples off the pixel centres."""
     allocate = pyrender.renderer.glRenderbufferStorageMultisample
@@ -68,9 +64,9 @@ def test_depth_and_pose_are_those_of_pyrender(
     scene.add(pinhole, pose=T_world_camera.matrix() @ np.diag([1.0, -1, -1, 1]))
     one_sample_per_pixel(monkeypatch)
     renderer = pyrender.OffscreenRenderer(camera.width, camera.height)
-    KEPT_OPEN.append(renderer)
     flags = pyrender.RenderFlags.DEPTH_ONLY | pyrender.RenderFlags.SKIP_CULL_FACES
     depth = renderer.render(scene, flags=flags)
+    renderer.delete()
     assert_same_depth(depths[name], np.where(depth > 0, depth, np.nan))
 
 
