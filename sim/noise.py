@@ -66,7 +66,7 @@ def fibre_bank() -> Image:
         strength = rng.integers(60, 255, 9000)
         for a, b, value in zip(start.astype(int), end.astype(int), strength, strict=True):
             cv2.line(layer, tuple(map(int, a)), tuple(map(int, b)), int(value), 1, cv2.LINE_AA)
-        sheet += tone * layer.astype(np.float32) / 255
+        sheet += tone * layer.astype(np.float32) / np.float32(255)
     grain = rng.standard_normal(sheet.shape).astype(np.float32)
     soft = cv2.GaussianBlur(grain, (0, 0), 0.8)
     sheet = sheet / sheet.std() * 0.75 + soft / soft.std() * 0.55 + grain * 0.25
@@ -112,7 +112,7 @@ def scratch_bank() -> Image:
         steps = length / 6 * np.stack([np.cos(bend), np.sin(bend)], 1)
         points = np.round((np.array([x, y]) + steps.cumsum(0)) * 8).astype(np.int32)
         cv2.polylines(layer, [points], False, int(rng.integers(50, 230)), 1, cv2.LINE_AA, 3)
-    return layer.astype(np.float32) / 255
+    return layer.astype(np.float32) / np.float32(255)
 
 
 def crop(bank: Image, shape: tuple[int, int], rng: np.random.Generator) -> Image:
