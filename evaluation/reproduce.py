@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import logging
-import multiprocessing
-import os
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 from rich.progress import track
 
-from evaluation.environment import prepare
+from evaluation.environment import usable_cores
 from evaluation.experiment import Protocol, Task, run_task
 from evaluation.results import ResultTable, Row
 from evaluation.setups import Setup, grouped_by_maps
 from evaluation.showcase import Showcase
+from evaluation.workers import outcomes
 from sim.presets import SensorPreset
 from sim.recorder import record
 from sim.scene import Scene
@@ -67,7 +65,7 @@ def reproduce(plan: Plan, recordings: Path, workers: int | None = None) -> Findi
             for setups in grouped_by_maps(plan.setups):
                 first = not tasks
                 tasks.append(Task(path, plan.seed, flight, setups, plan.protocol, first))
-    return _measured(tasks, workers or os.cpu_count() or 1)
+    return _measured(tasks, workers or usable_cores())
 
 
 def _recorded(plan: Plan, scene: Scene, flight: int, folder: Path, workers: int | None) -> Path:
@@ -83,17 +81,9 @@ def _recorded(plan: Plan, scene: Scene, flight: int, folder: Path, workers: int 
 
 def _measured(tasks: list[Task], workers: int) -> Findings:
     """The tasks' outcomes, in the order of the tasks whatever the order of finishing."""
-    processes = min(len(tasks), workers)
     rows: list[Row] = []
     showcase: Showcase | None = None
-    with ProcessPoolExecutor(
-        processes,
-        multiprocessing.get_context("spawn"),
-        initializer=prepare,
-        initargs=(max(1, workers // processes),),
-    ) as pool:
-        outcomes = pool.map(run_task, tasks)
-        for outcome in track(outcomes, "measuring", total=len(tasks)):
-            rows += outcome.rows
-            showcase = showcase or outcome.showcase
+    for outcome in track(outcomes(run_task, tasks, workers), "measuring", total=len(tasks)):
+        rows += outcome.rows
+        showcase = showcase or outcome.showcase
     return Findings(ResultTable.from_rows(rows), showcase)

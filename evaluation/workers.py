@@ -1,0 +1,56 @@
+"""Independent tasks on all cores, which Ctrl-C ends at once."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from typing import TypeVar
+
+from airground.errors import AirgroundError
+from evaluation.environment import prepare
+
+Task = TypeVar("Task")
+Outcome = TypeVar("Outcome")
+
+
+def outcomes(
+    function: Callable[[Task], Outcome], tasks: Sequence[Task], workers: int
+) -> Iterator[Outcome]:
+    """What `function` makes of each task, in the order of the tasks.
+
+    Args:
+        function: Of a module, since other processes import it.
+        tasks: What to do.
+        workers: Processes at a time; where there are fewer tasks, each gets more threads.
+
+    Raises:
+        AirgroundError: A process died.
+    """
+    if not tasks:
+        return
+    processes = min(len(tasks), workers)
+    # Spawned, not forked: OpenMP's threads do not survive a fork.
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(processes, context, _start, (max(1, workers // processes),))
+    try:
+        for future in [pool.submit(function, task) for task in tasks]:
+            yield future.result()
+    except BrokenProcessPool:
+        raise AirgroundError(
+            f"a process died, perhaps for lack of memory; try fewer than {processes} --threads"
+        ) from None
+    except BaseException:
+        # A task may take minutes: nobody waits for it any more.
+        for child in multiprocessing.active_children():
+            child.terminate()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _start(threads: int) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent to handle
+    prepare(threads)
