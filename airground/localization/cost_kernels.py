@@ -8,7 +8,7 @@ axis of these six, in this order.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 COUNT, SUM_A, SUM_G, SUM_AA, SUM_GG, SUM_AG = range(6)
@@ -54,7 +54,7 @@ def one_minus_correlation(
     return costs
 
 
-@njit(cache=True, error_model="numpy", parallel=True, fastmath=KEEPS_NAN)
+@njit(cache=True, error_model="numpy", fastmath=KEEPS_NAN)
 def sums_at_positions(
     aerial: NDArray[np.float32],
     aerial_mask: NDArray[np.float32],
@@ -74,7 +74,7 @@ def sums_at_positions(
         shifts: (M, 2) index in `ground` of the aerial cell [0, 0] [cells].
     """
     sums = np.zeros((len(shifts), 6))
-    for p in prange(len(shifts)):
+    for p in range(len(shifts)):
         shift_x, shift_y = np.floor(shifts[p, 0]), np.floor(shifts[p, 1])
         weight_x = np.float32(shifts[p, 0] - shift_x)
         weight_y = np.float32(shifts[p, 1] - shift_y)
@@ -87,11 +87,15 @@ def sums_at_positions(
             continue
         for row in range(rows):
             i, j = row_first + row, row_first + row + ix
+            low, high = first + iy, first + iy + length + 1
+            # One-dimensional slices: only these are known to be contiguous.
             _add_row(
                 aerial[i, first : first + length],
                 aerial_mask[i, first : first + length],
-                ground[j : j + 2, first + iy : first + iy + length + 1],
-                ground_mask[j : j + 2, first + iy : first + iy + length + 1],
+                ground[j, low:high],
+                ground[j + 1, low:high],
+                ground_mask[j, low:high],
+                ground_mask[j + 1, low:high],
                 weight_x,
                 weight_y,
                 sums[p],
@@ -103,19 +107,20 @@ def sums_at_positions(
 def _add_row(
     heights: NDArray,
     filled: NDArray,
-    ground: NDArray,
-    mask: NDArray,
+    g0: NDArray,
+    g1: NDArray,
+    m0: NDArray,
+    m1: NDArray,
     weight_x: np.float32,
     weight_y: np.float32,
     sums: NDArray,
 ) -> None:
-    """Add one row of the overlap; rows of `ground` and `mask` are the two neighbours in x."""
+    """Add one row of the overlap, between two rows of ground heights and of their mask."""
     zero, half = np.float32(0), np.float32(0.5)
     w00 = (np.float32(1) - weight_x) * (np.float32(1) - weight_y)
     w01 = (np.float32(1) - weight_x) * weight_y
     w10 = weight_x * (np.float32(1) - weight_y)
     w11 = weight_x * weight_y
-    g0, g1, m0, m1 = ground[0], ground[1], mask[0], mask[1]
     n, sum_a, sum_g, sum_aa, sum_gg, sum_ag = zero, zero, zero, zero, zero, zero
     for i in range(len(heights)):
         weight = w00 * m0[i] + w01 * m0[i + 1] + w10 * m1[i] + w11 * m1[i + 1]
@@ -137,7 +142,7 @@ def _add_row(
     sums[5] += sum_ag
 
 
-@njit(cache=True, error_model="numpy", parallel=True, fastmath=KEEPS_NAN)
+@njit(cache=True, error_model="numpy", fastmath=KEEPS_NAN)
 def sums_at_poses(
     cells: NDArray[np.float32],
     ground: NDArray[np.float32],
@@ -155,36 +160,32 @@ def sums_at_poses(
     half, one = np.float32(0.5), np.float32(1)
     last_x, last_y = np.float32(ground.shape[0] - 2), np.float32(ground.shape[1] - 2)
     sums = np.zeros((len(poses), 6))
-    for p in prange(len(poses)):
+    for p in range(len(poses)):
         x0, y0 = np.float32(poses[p, 0]), np.float32(poses[p, 1])
         c, s = np.float32(np.cos(poses[p, 2])), np.float32(np.sin(poses[p, 2]))
-        total = sums[p]
+        # Sums in registers: writing to the array for each cell would take most of the time.
+        n, sum_a, sum_g, sum_aa, sum_gg, sum_ag = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(len(cells)):
             # Clamped to the empty edge, where nothing counts.
             x = min(max(x0 + c * cells[i, 0] - s * cells[i, 1], np.float32(0)), last_x)
             y = min(max(y0 + s * cells[i, 0] + c * cells[i, 1], np.float32(0)), last_y)
-            ix, iy = int(x), int(y)
+            # Unsigned indices spare the check for negative ones.
+            ix, iy = np.uint64(x), np.uint64(y)
+            jx, jy = ix + np.uint64(1), iy + np.uint64(1)
             wx, wy = x - np.float32(ix), y - np.float32(iy)
             w00, w01, w10, w11 = (one - wx) * (one - wy), (one - wx) * wy, wx * (one - wy), wx * wy
-            weight = (
-                w00 * ground_mask[ix, iy]
-                + w01 * ground_mask[ix, iy + 1]
-                + w10 * ground_mask[ix + 1, iy]
-                + w11 * ground_mask[ix + 1, iy + 1]
-            )
+            weight = w00 * ground_mask[ix, iy] + w01 * ground_mask[ix, jy]
+            weight += w10 * ground_mask[jx, iy] + w11 * ground_mask[jx, jy]
             if weight < half:
                 continue
-            height = (
-                w00 * ground[ix, iy]
-                + w01 * ground[ix, iy + 1]
-                + w10 * ground[ix + 1, iy]
-                + w11 * ground[ix + 1, iy + 1]
-            )
+            height = w00 * ground[ix, iy] + w01 * ground[ix, jy]
+            height += w10 * ground[jx, iy] + w11 * ground[jx, jy]
             g, a = height / weight, cells[i, 2]
-            total[0] += 1
-            total[1] += a
-            total[2] += g
-            total[3] += a * a
-            total[4] += g * g
-            total[5] += a * g
+            n += 1.0
+            sum_a += a
+            sum_g += g
+            sum_aa += a * a
+            sum_gg += g * g
+            sum_ag += a * g
+        sums[p] = n, sum_a, sum_g, sum_aa, sum_gg, sum_ag
     return sums

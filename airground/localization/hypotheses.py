@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from airground.localization.particles import draw_cells
 
 COARSE_STEP_DEG = 4.0
 REFINED_MODES = 12
+THREADS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,20 +86,24 @@ def search_headings(
         ground, centre, config: As for `search_positions`.
     """
     cells = _cells(aerial)
-    reach = int(np.ceil(np.linalg.norm(cells[:, :2], axis=1).max() * aerial.cells_per_m)) + 1
+    reach = (
+        int(np.ceil(np.linalg.norm(cells[:, :2], axis=1).max(initial=0) * aerial.cells_per_m)) + 1
+    )
     reach_cells = np.array([[-reach, -reach], [reach, reach]])
     search = OffsetSearch(ground, centre, config.search_radius_m, reach_cells)
     step = max(1, int(COARSE_STEP_DEG / 360.0 * config.headings))
-    found: dict[int, NDArray[np.float32]] = {}
-    for turn in range(0, config.headings, step):
-        found[turn] = _costs_turned(search, cells, turn, aerial.cells_per_m, config)
-    if step > 1:
+
+    def costs_of(turn: int) -> NDArray[np.float32]:
+        return _costs_turned(search, cells, turn, aerial.cells_per_m, config)
+
+    coarse = list(range(0, config.headings, step))
+    with ThreadPoolExecutor(THREADS) as pool:
+        found = dict(zip(coarse, pool.map(costs_of, coarse), strict=True))
         lowest = {turn: np.nanmin(c) for turn, c in found.items() if np.isfinite(c).any()}
-        for turn in sorted(lowest, key=lambda t: lowest[t])[:REFINED_MODES]:
-            for near in range(turn - step + 1, turn + step):
-                fine = near % config.headings
-                if fine not in found:
-                    found[fine] = _costs_turned(search, cells, fine, aerial.cells_per_m, config)
+        promising = sorted(lowest, key=lambda turn: lowest[turn])[:REFINED_MODES]
+        near = {(t + d) % config.headings for t in promising for d in range(1 - step, step)}
+        fine = sorted(near - found.keys())
+        found.update(zip(fine, pool.map(costs_of, fine), strict=True))
     turns = sorted(found)
     headings = np.array(turns) * 2 * np.pi / config.headings
     costs = np.stack([found[turn] for turn in turns])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from airground.config import Refinement
@@ -61,7 +61,7 @@ def _best_shift(
     return float(costs[ix, iy]), np.array([ix, iy]) - reach, float(heights[ix, iy])
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@njit(cache=True, error_model="numpy")
 def _shift_costs(
     aerial: NDArray, ground: NDArray, first: NDArray, reach: int
 ) -> tuple[NDArray, NDArray, NDArray]:
@@ -70,7 +70,7 @@ def _shift_costs(
     costs = np.full((side, side), np.inf)
     counts = np.zeros((side, side))
     heights = np.zeros((side, side))
-    for sx in prange(side):
+    for sx in range(side):
         for sy in range(side):
             x0, y0 = first[0] + sx - reach, first[1] + sy - reach
             low, high = max(0, -y0), min(aerial.shape[1], ground.shape[1] - y0)

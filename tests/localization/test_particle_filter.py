@@ -140,8 +140,10 @@ def test_a_map_without_overlap_neither_kills_the_belief_nor_claims(flight):
 
 
 @pytest.mark.parametrize("points", [np.zeros((0, 3), np.float32), np.zeros((3, 3), np.float32)])
-def test_an_empty_surface_is_refused_not_an_error(flight, points):
-    localizer = MonteCarloLocalizer(Config(), np.random.default_rng(0))
+@pytest.mark.parametrize("heading", ["known", "search"])
+def test_an_empty_surface_is_refused_not_an_error(flight, points, heading):
+    config = changed(Config(), heading=heading, headings=30)
+    localizer = MonteCarloLocalizer(config, np.random.default_rng(0))
     *_, last = localizer.update(0, points, np.zeros(3), flight.ground, np.zeros(2), HEADING)
     assert not last.belief.converged
     assert last.belief.refusal
