@@ -119,7 +119,8 @@ class Localization(Section):
     sigma: Positive = 0.05
     """Eq. 5, in units of the cost (m^2 for zmssd, none for ncc)."""
     sigma_units: Literal["cost", "minmax"] = "cost"
-    """Whether sigma divides the cost itself or the cost scaled to [0, 1] over the map."""
+    """Whether sigma divides the cost itself, or the cost scaled to [0, 1] over what is
+    compared: all of the map at first, the particles afterwards."""
     min_overlap: Fraction = 0.3
     """Smallest overlap, as a fraction of the aerial map's filled cells."""
     search_radius_m: Positive = 3.0

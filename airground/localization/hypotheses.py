@@ -48,12 +48,6 @@ class CostVolume:
         heading = float(self.headings[best])
         return CostMap(self.costs[best], self.origin, self.cells_per_m, heading, cost)
 
-    def span(self) -> float:
-        """Highest minus lowest cost; 1 where that says nothing."""
-        if not self.feasible:
-            return 1.0
-        return float(np.nanmax(self.costs) - np.nanmin(self.costs)) or 1.0
-
     def draw(self, count: int, sigma: float, rng: np.random.Generator) -> NDArray[np.float64]:
         """(count, 3) hypotheses by Eq. 5, spread evenly within their cells; uniform if none fit."""
         costs = self.costs if self.feasible else np.zeros_like(self.costs)

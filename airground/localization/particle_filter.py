@@ -18,7 +18,7 @@ from airground.localization.acceptance import why_refused
 from airground.localization.cost_map import Overlays, overlay_at, overlay_turned, reach_of
 from airground.localization.height_map import aerial_height_map, ground_height_map
 from airground.localization.hypotheses import CostVolume, search_headings, search_positions
-from airground.localization.particles import densest_mode, mean_pose, resample, weights
+from airground.localization.particles import densest_mode, mean_pose, resample, span, weights
 
 
 class MonteCarloLocalizer:
@@ -39,7 +39,6 @@ class MonteCarloLocalizer:
         self._rng = rng
         self._particles: NDArray[np.float64] | None = None
         self._position_mav = np.zeros(3)
-        self._sigma = config.localization.sigma
         self.belief: Belief | None = None
 
     def update(
@@ -81,12 +80,12 @@ class MonteCarloLocalizer:
 
         if self._particles is None:
             assert volume is not None
-            self._sigma = self._sigma_of(volume)
-            particles = volume.draw(self._local.particles, self._sigma, self._rng)
+            sigma = self._sigma_of(volume.costs)
+            particles = volume.draw(self._local.particles, sigma, self._rng)
         else:
             moved = self._move(self._particles, position_mav - self._position_mav, turn)
-            weight = weights(self._overlay(aerial, ground, moved).costs(self._local), self._sigma)
-            particles = moved[resample(weight, self._rng)]
+            costs = self._overlay(aerial, ground, moved).costs(self._local)
+            particles = moved[resample(weights(costs, self._sigma_of(costs)), self._rng)]
 
         self.belief = self._summarize(
             stamp_ns, particles, np.asarray(points_mav), position_mav, aerial, ground
@@ -133,11 +132,10 @@ class MonteCarloLocalizer:
             return overlay_turned(aerial, ground, particles)
         return overlay_at(aerial, ground, particles[:, :2])
 
-    def _sigma_of(self, volume: CostVolume) -> float:
-        """Sigma of Eq. 5 in units of the cost; the first map sets the scale for later ones."""
-        if self._local.sigma_units == "cost":
-            return self._local.sigma
-        return self._local.sigma * volume.span()
+    def _sigma_of(self, costs: NDArray) -> float:
+        """Sigma of Eq. 5 in units of the costs that it is used on."""
+        scale = span(costs) if self._local.sigma_units == "minmax" else 1.0
+        return self._local.sigma * scale
 
     def _move(self, particles: NDArray, motion_mav: NDArray, turn: float) -> NDArray[np.float64]:
         """Eq. 6: the motion that the MAV's SLAM saw, turned into `ground`, plus noise."""
@@ -161,8 +159,9 @@ class MonteCarloLocalizer:
         count = round(self._local.redrawn_fraction * len(particles))
         if volume is None or not volume.feasible or count == 0:
             return particles
+        drawn = volume.draw(count, self._sigma_of(volume.costs), self._rng)
         kept = self._rng.permutation(len(particles))[count:]
-        return np.concatenate([particles[kept], volume.draw(count, self._sigma, self._rng)])
+        return np.concatenate([particles[kept], drawn])
 
     def _summarize(
         self,

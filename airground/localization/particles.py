@@ -16,6 +16,12 @@ def likelihoods(costs: NDArray, sigma: float) -> NDArray[np.float64]:
     return np.exp(-(costs - np.nanmin(costs)) / sigma)
 
 
+def span(costs: NDArray) -> float:
+    """Highest minus lowest cost; 1 where that says nothing."""
+    finite = costs[np.isfinite(costs)]
+    return float(np.ptp(finite)) or 1.0 if len(finite) else 1.0
+
+
 def weights(costs: NDArray, sigma: float) -> NDArray[np.float64]:
     """(M,) normalized weights of particles by their costs.
 
