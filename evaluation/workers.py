@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
@@ -11,6 +10,7 @@ from typing import TypeVar
 
 from airground.errors import AirgroundError
 from evaluation.environment import prepare
+from sim.interrupts import deaf_children
 
 Task = TypeVar("Task")
 Outcome = TypeVar("Outcome")
@@ -34,9 +34,11 @@ def outcomes(
     processes = min(len(tasks), workers)
     # Spawned, not forked: OpenMP's threads do not survive a fork.
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(processes, context, _start, (max(1, workers // processes),))
+    pool = ProcessPoolExecutor(processes, context, prepare, (max(1, workers // processes),))
     try:
-        for future in [pool.submit(function, task) for task in tasks]:
+        with deaf_children():
+            futures = [pool.submit(function, task) for task in tasks]
+        for future in futures:
             yield future.result()
     except BrokenProcessPool:
         raise AirgroundError(
@@ -49,8 +51,3 @@ def outcomes(
         raise
     finally:
         pool.shutdown(cancel_futures=True)
-
-
-def _start(threads: int) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent to handle
-    prepare(threads)

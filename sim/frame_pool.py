@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import signal
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -13,6 +12,7 @@ import cv2
 
 from airground.errors import AirgroundError
 from sim.frames import FrameMaker, FramePlan, Written
+from sim.interrupts import deaf_children
 from sim.motion import ROBOTS, Robot
 
 FRAMES_PER_TASK = 8
@@ -42,7 +42,9 @@ def make_frames(plan: FramePlan, workers: int) -> Iterator[list[Written]]:
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(workers, context, _start_worker, (plan, threads))
     try:
-        for future in as_completed([pool.submit(_work, task) for task in tasks]):
+        with deaf_children():
+            futures = [pool.submit(_work, task) for task in tasks]
+        for future in as_completed(futures):
             yield future.result()
     except BrokenProcessPool:
         raise AirgroundError(
@@ -74,7 +76,6 @@ _maker: FrameMaker | None = None  # one a process
 def _start_worker(plan: FramePlan, threads: int) -> None:
     global _maker
     os.environ.setdefault("LP_NUM_THREADS", str(threads))  # of Mesa's software renderer
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent to handle
     cv2.setNumThreads(1)
     _maker = FrameMaker(plan)
 

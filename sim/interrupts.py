@@ -1,0 +1,17 @@
+"""Who hears Ctrl-C when there are several processes."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+@contextmanager
+def deaf_children() -> Iterator[None]:
+    """Processes that start in here leave Ctrl-C to their parent, from their first import on."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
