@@ -80,18 +80,21 @@ class Truth:
     def surface(self) -> o3d.t.geometry.RaycastingScene:
         """The true surface, ready for rays and distances."""
         path = self.folder / "surface.ply"
-        mesh = o3d.io.read_triangle_mesh(str(path)) if path.is_file() else None
+        mesh = o3d.io.read_triangle_mesh(path) if path.is_file() else None
         if mesh is None or not mesh.has_triangles():
             raise RecordingError(f"{path}: no readable mesh with triangles")
         scene = o3d.t.geometry.RaycastingScene()
         vertices = np.asarray(mesh.vertices).astype(np.float32)
-        scene.add_triangles(vertices, np.asarray(mesh.triangles).astype(np.uint32))
+        scene.add_triangles(
+            o3d.core.Tensor.from_numpy(vertices),
+            o3d.core.Tensor.from_numpy(np.asarray(mesh.triangles).astype(np.uint32)),
+        )
         return scene
 
     def distance_to_surface(self, points_world: NDArray) -> NDArray[np.float32]:
         """(N,) distance of points (N, 3) to the nearest point of the true surface [m]."""
         points = np.ascontiguousarray(points_world, dtype=np.float32)
-        return self.surface.compute_distance(o3d.core.Tensor(points)).numpy()
+        return self.surface.compute_distance(o3d.core.Tensor.from_numpy(points)).numpy()
 
     def depth(self, robot: Robot, stamp_ns: int) -> NDArray[np.float32]:
         """(height, width) true depth [m] of the frame with this stamp, NaN for nothing.
@@ -106,7 +109,7 @@ class Truth:
         origins = np.broadcast_to(T_world_camera.translation, directions.shape)
         rays = np.concatenate([origins, directions], axis=-1).astype(np.float32)
         # Directions have z = 1 in the camera, so that their multiples are depths.
-        depth = self.surface.cast_rays(o3d.core.Tensor(rays))["t_hit"].numpy()
+        depth = self.surface.cast_rays(o3d.core.Tensor.from_numpy(rays))["t_hit"].numpy()
         return np.where(np.isfinite(depth), depth, np.float32(np.nan))
 
 
@@ -126,7 +129,7 @@ def write_truth(
         o3d.utility.Vector3dVector(np.array(world.vertices)),
         o3d.utility.Vector3iVector(np.array(world.triangles)),
     )
-    if not o3d.io.write_triangle_mesh(str(folder / "surface.ply"), mesh):
+    if not o3d.io.write_triangle_mesh(folder / "surface.ply", mesh):
         raise OSError(f"{folder / 'surface.ply'}: cannot be written")
     _write_boxes(folder / "boxes.csv", world)
 
