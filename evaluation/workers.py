@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from airground.errors import AirgroundError
 from evaluation.environment import prepare
-from sim.interrupts import deaf_children
+from sim.interrupts import deaf_children, end_children
 
 Task = TypeVar("Task")
 Outcome = TypeVar("Outcome")
@@ -45,9 +45,7 @@ def outcomes(
             f"a process died, perhaps for lack of memory; try fewer than {processes} --threads"
         ) from None
     except BaseException:
-        # A task may take minutes: nobody waits for it any more.
-        for child in multiprocessing.active_children():
-            child.terminate()
+        end_children()
         raise
     finally:
         pool.shutdown(cancel_futures=True)

@@ -12,7 +12,7 @@ import cv2
 
 from airground.errors import AirgroundError
 from sim.frames import FrameMaker, FramePlan, Written
-from sim.interrupts import deaf_children
+from sim.interrupts import deaf_children, end_children
 from sim.motion import ROBOTS, Robot
 
 FRAMES_PER_TASK = 8
@@ -51,6 +51,9 @@ def make_frames(plan: FramePlan, workers: int) -> Iterator[list[Written]]:
             "a rendering process died, perhaps for lack of memory: "
             f"try fewer than {workers} workers"
         ) from None
+    except BaseException:
+        end_children()
+        raise
     finally:
         pool.shutdown(cancel_futures=True)
 
