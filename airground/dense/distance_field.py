@@ -108,8 +108,10 @@ def add_field(
         bins: Number of bins.
     """
     rows, planes, columns = counts.shape
-    outside = width * height
-    half, one = np.float32(0.5), np.float32(1.0)
+    # one stray 64-bit operand would widen whole loops
+    outside, stride = np.int32(width * height), np.int32(width)
+    right, bottom = np.float32(width), np.float32(height)
+    zero, half, one = np.float32(0.0), np.float32(0.5), np.float32(1.0)
     per_metre, levels = np.float32(inverse_truncation), np.float32(0.5 * bins)
     for y in prange(rows):
         index = np.empty(columns, np.int32)
@@ -127,10 +129,10 @@ def add_field(
                 u = (plane * (matrix[0, 0] * column + base0) + shift[0]) * inverse + half
                 v = (plane * (matrix[1, 0] * column + base1) + shift[1]) * inverse + half
                 z[x] = w
-                inside = (w > 0) & (u >= 0) & (u < width) & (v >= 0) & (v < height)
-                iu = np.int32(u) if inside else np.int32(0)
-                iv = np.int32(v) if inside else np.int32(0)
-                index[x] = iv * np.int32(width) + iu if inside else np.int32(outside)
+                inside = (w > zero) & (u >= zero) & (u < right) & (v >= zero) & (v < bottom)
+                iu = np.int32(u if inside else zero)
+                iv = np.int32(v if inside else zero)
+                index[x] = np.int32(iv * stride + iu) if inside else outside
             for x in range(columns):
                 seen[x] = depth[index[x]]
             row = counts[y, k]
@@ -138,5 +140,8 @@ def add_field(
                 value = (seen[x] - z[x]) * per_metre
                 visible = value >= -one
                 level = (min(value, np.float32(0.999)) + one) * levels
-                bits = np.uint32(4) * np.uint32(level if visible else np.float32(0))
-                row[x] = np.uint32(row[x]) + (np.uint32(visible) << bits)
+                bin_index = np.int32(level) if visible else np.int32(-1)
+                vote = np.uint32(0)
+                for j in range(MAX_BINS):
+                    vote = np.uint32(1 << (4 * j)) if bin_index == j else vote
+                row[x] = np.uint32(row[x] + vote)

@@ -20,6 +20,13 @@ from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.dense import sweep_kernels as kernels
 
+GAIN_BLUR_PX = 21
+"""Brightness is compared over squares of this side [px] ..."""
+GAIN_STRIDE_PX = 6
+"""... this far apart [px] ..."""
+GAIN_MIN_SAMPLES = 30
+"""... and left alone where fewer of them overlap."""
+
 
 def inverse_depth_planes(near_m: float, far_m: float, count: int) -> NDArray[np.float64]:
     """(count,) depths [m] from near to far, evenly spaced in inverse depth."""
@@ -33,6 +40,19 @@ def halved(image: NDArray[np.uint8]) -> NDArray[np.float32]:
     height, width = (n // 2 * 2 for n in image.shape)
     blocks = image[:height, :width].astype(np.float32)
     return 0.25 * (blocks[::2, ::2] + blocks[1::2, ::2] + blocks[::2, 1::2] + blocks[1::2, 1::2])
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Brightness of the reference over that of a view: level + x column + y row.
+
+    The level follows the exposure. Vignetting falls with the square of the distance from
+    the middle, so that the ratio of two views shifted against each other is a plane.
+    """
+
+    level: float
+    x: float
+    y: float
 
 
 @dataclass(frozen=True)
@@ -73,8 +93,11 @@ class TurnedView:
         phases = np.ascontiguousarray(blocks.transpose(1, 0, 3, 2), np.float32)
         return cls(phases, _row_limits(inside == 255)[: 2 * height])
 
-    def scaled(self, gain: float) -> TurnedView:
-        return TurnedView(self.phases * np.float32(gain), self.valid)
+    def scaled(self, gain: Gain) -> TurnedView:
+        """The view as bright as the reference."""
+        _, height, _, width = self.phases.shape
+        factor = gain.level + gain.x * np.arange(width) + gain.y * np.arange(height)[:, None]
+        return TurnedView(self.phases * factor.astype(np.float32)[None, :, None, :], self.valid)
 
 
 def _row_limits(inside: NDArray[np.bool_]) -> NDArray[np.int32]:
@@ -173,17 +196,32 @@ class PlaneSweep:
         y_shift = camera.cy * (1 - scale) - camera.fy * centre[1] / (self.depths - centre[2])
         return 2 * scale, 2 * x_shift, 2 * scale, 2 * y_shift
 
-    def _gain(self, view: TurnedView, centre: NDArray) -> float:
-        """The factor that gives the view the reference's brightness, at the middle plane."""
+    def _gain(self, view: TurnedView, centre: NDArray) -> Gain:
+        """What gives the view the reference's brightness, seen through the middle plane.
+
+        The least-squares plane through the ratio of the two, blurred so much that depth
+        does not matter, with one round of leaving out what fits badly.
+        """
         middle = len(self.depths) // 2
         column_scale, column_shift, row_scale, row_shift = (
             m[middle] / 2 for m in self._plane_maps(centre)
         )
-        even = view.phases[0, :, 0, :]
         matrix = np.array([[column_scale, 0, column_shift], [0, row_scale, row_shift]])
         size = (self.camera.width, self.camera.height)
         flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
-        moved = cv2.warpAffine(even, matrix, size, flags=flags, borderValue=-1)
-        seen = moved >= 0
-        total = float(moved[seen].sum())
-        return float(self.reference[seen].sum()) / total if total > 0 else 1.0
+        even = np.ascontiguousarray(view.phases[0, :, 0, :])
+        moved = cv2.warpAffine(even, matrix, size, flags=flags, borderValue=-1e6)
+        coarse = np.s_[GAIN_BLUR_PX // 2 :: GAIN_STRIDE_PX, GAIN_BLUR_PX // 2 :: GAIN_STRIDE_PX]
+        blurred = cv2.blur(moved, (GAIN_BLUR_PX, GAIN_BLUR_PX))[coarse].ravel()
+        target = cv2.blur(self.reference, (GAIN_BLUR_PX, GAIN_BLUR_PX))[coarse].ravel()
+        rows, columns = (axis[coarse].ravel() for axis in np.mgrid[: size[1], : size[0]])
+        terms = np.column_stack([np.ones(len(rows)), columns, rows]) * blurred[:, None]
+        good = blurred > 1
+        gain = np.array([1.0, 0.0, 0.0])
+        for _ in range(2):
+            if good.sum() < GAIN_MIN_SAMPLES:
+                break
+            gain = np.linalg.lstsq(terms[good], target[good], rcond=None)[0]
+            off = np.abs(terms @ gain - target)
+            good &= off <= 2.5 * np.median(off[good]) + 0.5
+        return Gain(*gain)

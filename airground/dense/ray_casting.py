@@ -55,14 +55,14 @@ def surface_cloud(
 ) -> PointCloud:
     """The cast points in the MAV's map, with the grey values of the reference view."""
     seen = np.isfinite(depth)
-    points = volume.camera.back_project(depth)[seen]
+    points = volume.camera.rays()[seen] * depth[seen][:, None]
     rows, columns = np.nonzero(seen)
     image = reference.image
     grey = image[
         rows * image.shape[0] // depth.shape[0], columns * image.shape[1] // depth.shape[1]
     ]
     return PointCloud(
-        (volume.T_mav_camera @ points.astype(np.float64)).astype(np.float32),
+        (volume.T_mav_camera @ points).astype(np.float32),
         np.repeat(grey[:, None], 3, axis=1),
         (normals[seen].astype(np.float64) @ volume.T_mav_camera.rotation.T).astype(np.float32),
     )

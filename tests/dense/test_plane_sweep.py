@@ -150,10 +150,13 @@ def test_window_must_have_a_middle() -> None:
         aggregate([CostVolume(4, 3, 5)], 3, 40.0, 1.0)
 
 
-def test_brightness_of_a_view_does_not_matter() -> None:
+def test_exposure_and_vignetting_of_a_view_do_not_matter() -> None:
     rng = np.random.default_rng(3)
-    image = rng.integers(40, 160, (32, 48)).astype(np.uint8)
+    camera = PinholeCamera(240, 160, 134.0, 134.0, 119.5, 79.5)
+    image = rng.integers(60, 140, (160, 240)).astype(np.float64)
+    tilt = 1.2 + 0.1 * np.linspace(-1, 1, 240) - 0.05 * np.linspace(-1, 1, 160)[:, None]
     depths = inverse_depth_planes(1.0, 2.0, 9)
-    sweep = PlaneSweep(image, CAMERA, SE3.identity(), depths, Parameters(), 1)
-    sweep.add(np.round(image * 1.3).astype(np.uint8), SE3.identity(), 0)
+    reference = np.round(image).astype(np.uint8)
+    sweep = PlaneSweep(reference, camera, SE3.identity(), depths, Parameters(), 1)
+    sweep.add(np.round(image * tilt).astype(np.uint8), SE3.identity(), 0)
     assert sweep.volumes[0].costs.mean() / COST_SCALE < 1.0
