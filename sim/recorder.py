@@ -189,7 +189,11 @@ def _store_model(root: Path, scene: Scene, seed: int, true: CalibrationTable) ->
     world = build_world(scene, seed)
     cameras = {"mav": true.mav.camera.pinhole(), "ground": true.ground.camera.pinhole()}
     path = root / "world.mjb"
-    mujoco.mj_saveModel(with_cameras(world.spec, cameras), str(path), None)
+    model = with_cameras(world.spec, cameras)
+    # MuJoCo only prints a warning when the disk is full.
+    if shutil.disk_usage(root).free < mujoco.mj_sizeModel(model):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    mujoco.mj_saveModel(model, str(path), None)
     return path
 
 
