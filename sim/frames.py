@@ -77,7 +77,7 @@ class FrameMaker:
         self._renderer = Renderer(mujoco.MjModel.from_binary_path(str(plan.model)))
         self._sensors: dict[Robot, ImageSensor] = {}
         if plan.preset.image is not None:
-            for number, robot in enumerate(ROBOTS):
+            for number, robot in enumerate(ROBOTS, start=1):
                 camera = self._table(robot).camera.pinhole()
                 rng = np.random.default_rng([*plan.seeds, number])
                 self._sensors[robot] = ImageSensor.of(camera, plan.preset.image, rng)
@@ -92,8 +92,9 @@ class FrameMaker:
         """Write the files of one frame."""
         stamp = int(self._plan.stamps_ns[robot][index])
         time_ns = stamp + self._table(robot).camera.time_offset_ns
-        # Noise depends on the frame alone, not on who makes it.
-        rng = np.random.default_rng([*self._plan.seeds, ROBOTS.index(robot), index])
+        # Noise depends on the frame alone, not on who makes it. Counted from 1, for numpy
+        # takes [a] and [a, 0] as the same seed.
+        rng = np.random.default_rng([*self._plan.seeds, ROBOTS.index(robot) + 1, index + 1])
         return (
             self._mav(stamp, time_ns, rng) if robot == "mav" else self._ground(stamp, time_ns, rng)
         )
