@@ -31,24 +31,15 @@ def add_ground(
     baker: LightBaker | None,
     rng: np.random.Generator,
 ) -> None:
-    """Add the terrain as four panels that share one picture."""
-    picture = None
+    """Add the terrain with one picture over all of it, so that no seam shows."""
     if baker:
         size = (float(ground.size_m[0]), float(ground.size_m[1]))
         unlit = paint_ground(size, GROUND_PX_PER_M, light.azimuth_deg, rng)
         picture = np.empty_like(unlit)
         light_up(unlit, _ground_light(ground, baker), picture)
-    middle = np.array(ground.heights.shape) // 2
-    for index, (east, north) in enumerate(((0, 1), (1, 1), (0, 0), (1, 0))):
-        x = slice(middle[0], None) if east else slice(middle[0] + 1)
-        y = slice(middle[1], None) if north else slice(middle[1] + 1)
-        name = f"ground_{index}"
-        mesh, coordinates = ground.panel(x, y)
-        if picture is not None:
-            rows, columns = (n // 2 for n in picture.shape[:2])
-            top, left = (0 if north else rows), (columns if east else 0)
-            add_picture(spec, name, picture[top : top + rows, left : left + columns], cube=False)
-        _add_mesh(spec, name, mesh, coordinates, _PLAIN_GROUND, picture is not None)
+        add_picture(spec, "ground", picture, cube=False)
+    coordinates = ground.picture_coordinates()
+    _add_mesh(spec, "ground", ground.mesh(), coordinates, _PLAIN_GROUND, baker is not None)
 
 
 def add_rocks(

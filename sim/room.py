@@ -49,22 +49,15 @@ def add_room(
 def _add_floor(
     spec: mujoco.MjSpec, room: Room, baker: LightBaker | None, rng: np.random.Generator
 ) -> None:
-    """Four panels that share one picture, so that nothing repeats and no texture is too large."""
+    """One picture over the whole floor, so that nothing repeats and no seam shows."""
     half = np.array(room.size_m) / 2
-    picture = None
     if baker:
         paint = paint_concrete if room.floor == "concrete" else paint_print
         right, up = np.array([half[0], 0, 0]), np.array([0, half[1], 0])
         light = _light_map(baker, np.zeros(3), right, up, FLOOR_LIGHT_CELL_M)
         picture = _lit(paint(room.size_m, FLOOR_PX_PER_M, rng), light)
-    for index, (sx, sy) in enumerate(((-1, 1), (1, 1), (-1, -1), (1, -1))):
-        name = f"floor_{index}"
-        if picture is not None:
-            rows, columns = (n // 2 for n in picture.shape[:2])
-            top, left = (0 if sy > 0 else rows), (0 if sx < 0 else columns)
-            add_picture(spec, name, picture[top : top + rows, left : left + columns], cube=False)
-        centre = np.array([sx * half[0] / 2, sy * half[1] / 2, 0])
-        _add_panel(spec, name, half / 2, centre, np.array([1.0, 0, 0, 0]), picture is not None)
+        add_picture(spec, "floor", picture, cube=False)
+    _add_panel(spec, "floor", half, np.zeros(3), np.array([1.0, 0, 0, 0]), baker is not None)
 
 
 def _add_panel(

@@ -21,6 +21,7 @@ ROUNDS = 6
 SETTLE_S = 4.0
 SETTLED_MPS = 0.02
 _PARKED_M = 200.0
+_PILE_SPREAD_M = 0.35
 _MARGIN_M = 0.03  # between the wall that holds boxes back and the clearance that is checked
 
 
@@ -63,7 +64,7 @@ def make_heap(scene: Scene, rng: np.random.Generator) -> tuple[Box, ...]:
         return ()
     makes, sizes = _draw_boxes(rubble, rng)
     lane = lane_points(scene)
-    heap = _Heap(scene, sizes, lane)
+    heap = _Heap(scene, sizes, lane, rng)
     everything = np.arange(len(sizes))
     heap.throw(everything, rng)
     heap.settle(walled=True)
@@ -132,7 +133,9 @@ def _draw_boxes(rubble: Rubble, rng: np.random.Generator) -> tuple[NDArray, NDAr
 class _Heap:
     """The physics of a heap while it settles."""
 
-    def __init__(self, scene: Scene, sizes: NDArray, lane: NDArray) -> None:
+    def __init__(
+        self, scene: Scene, sizes: NDArray, lane: NDArray, rng: np.random.Generator
+    ) -> None:
         assert scene.rubble is not None
         self.rubble = scene.rubble
         self.sizes = sizes
@@ -144,6 +147,7 @@ class _Heap:
         self.parked = np.zeros(len(sizes), bool)
         self.park(np.arange(len(sizes)))
         self.parked[:] = False
+        self.piles = self._draw_piles(rng)
 
     def _qpos(self) -> NDArray:
         return self.data.qpos.reshape(-1, 7)
@@ -185,11 +189,28 @@ class _Heap:
     def _free_places(self, radius: float, rng: np.random.Generator) -> NDArray:
         """(K, 2) places in the area, off the lane."""
         half = np.array(self.rubble.area_m) / 2
-        places = rng.uniform(-half, half, (40, 2))
-        away = np.linalg.norm(places[:, None] - self.lane[None, ::5], axis=2).min(1)
-        order = np.argsort(-away)
-        free = places[away > self.rubble.clearance_m + 0.7 * radius][:6]
-        return free if len(free) else places[order[:1]]
+        places, choice = rng.uniform(-half, half, (40, 2)), 6
+        if len(self.piles):
+            chosen = self.piles[rng.integers(len(self.piles), size=40)]
+            places = np.clip(chosen + rng.normal(0, _PILE_SPREAD_M, (40, 2)), -half, half)
+            choice = 2  # fewer to choose the lowest from: they pile up
+        away = self._from_lane(places)
+        free = places[away > self.rubble.clearance_m + 0.7 * radius][:choice]
+        return free if len(free) else places[[np.argmax(away)]]
+
+    def _from_lane(self, places: NDArray) -> NDArray:
+        """(K,) distance of places (K, 2) to the lane [m]."""
+        return np.linalg.norm(places[:, None] - self.lane[None, ::5], axis=2).min(1)
+
+    def _draw_piles(self, rng: np.random.Generator) -> NDArray:
+        """(piles, 2) places off the lane, as far apart as many tries bring them."""
+        half = np.array(self.rubble.area_m) / 2 - _PILE_SPREAD_M
+        piles = np.empty((0, 2))
+        for _ in range(self.rubble.piles):
+            places = rng.uniform(-half, half, (200, 2))
+            apart = np.linalg.norm(places[:, None] - piles[None], axis=2).min(1, initial=1.5)
+            piles = np.append(piles, places[[np.argmax(apart + self._from_lane(places))]], axis=0)
+        return piles
 
     def settle(self, walled: bool) -> None:
         """Step until nothing moves, or for a few seconds."""

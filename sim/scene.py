@@ -53,6 +53,8 @@ class Rubble(Part):
     """Number of different makes (size, board, print)."""
     self_similarity: Fraction = 0.0
     """Share of boxes that are of the first make; the rest is drawn from all makes."""
+    piles: Annotated[int, Field(ge=0, le=50)] = 0
+    """Boxes are dropped around so many places and pile up there; 0 spreads them evenly."""
     tumble: Fraction = 1.0
     """0 drops boxes upright and aligned with the room, 1 in any orientation."""
     clearance_m: Positive = 0.45

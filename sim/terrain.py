@@ -1,4 +1,4 @@
-"""Natural ground: an uneven height field, cut into panels, and where rocks lie on it."""
+"""Natural ground: an uneven height field on a regular grid, split into triangles."""
 
 from __future__ import annotations
 
@@ -51,22 +51,19 @@ class HeightField:
         above = low + b * (h[i, j + 1] - low) + a * (high - h[i, j + 1])
         return np.where(outside, np.nan, np.where(a >= b, below, above))
 
-    def panel(self, rows: slice, columns: slice) -> tuple[Mesh, NDArray[np.float64]]:
-        """The mesh over some of the grid's nodes, and its texture coordinates (V, 2).
-
-        Coordinates run from 0 to 1 along x, and along y downward as pictures do.
-        """
-        nx, ny = self.heights.shape
-        x = ((np.arange(nx) / (nx - 1) - 0.5) * self.size_m[0])[rows]
-        y = ((np.arange(ny) / (ny - 1) - 0.5) * self.size_m[1])[columns]
-        grid = np.meshgrid(x, y, indexing="ij")
-        vertices = np.stack([*grid, self.heights[rows, columns]], axis=-1).reshape(-1, 3)
-        u, v = np.meshgrid(np.linspace(0, 1, len(x)), np.linspace(1, 0, len(y)), indexing="ij")
-        return (vertices, _grid_triangles(len(x), len(y))), np.stack([u, v], -1).reshape(-1, 2)
-
     def mesh(self) -> Mesh:
-        """The whole field."""
-        return self.panel(slice(None), slice(None))[0]
+        """Two triangles a cell, facing up."""
+        nx, ny = self.heights.shape
+        x = (np.arange(nx) / (nx - 1) - 0.5) * self.size_m[0]
+        y = (np.arange(ny) / (ny - 1) - 0.5) * self.size_m[1]
+        vertices = np.stack([*np.meshgrid(x, y, indexing="ij"), self.heights], axis=-1)
+        return vertices.reshape(-1, 3), _grid_triangles(nx, ny)
+
+    def picture_coordinates(self) -> NDArray[np.float64]:
+        """(V, 2) of the mesh's vertices, 0 to 1: along x, and along y downward as in pictures."""
+        nx, ny = self.heights.shape
+        u, v = np.meshgrid(np.linspace(0, 1, nx), np.linspace(1, 0, ny), indexing="ij")
+        return np.stack([u, v], axis=-1).reshape(-1, 2)
 
     def normals(self, x: NDArray, y: NDArray) -> NDArray[np.float64]:
         """(N, 3) unit normals of the smoothed ground at x, y (N,)."""
