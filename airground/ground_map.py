@@ -32,11 +32,11 @@ class GroundMap:
     def __init__(self, camera: PinholeCamera, config: GroundMapping) -> None:
         self.keyframes = 0
         self._config = config
-        self._intrinsics = o3d.core.Tensor(camera.matrix())
+        self._intrinsics = o3d.core.Tensor.from_numpy(camera.matrix())
         self._grid = o3d.t.geometry.VoxelBlockGrid(
             attr_names=("tsdf", "weight", "color"),
             attr_dtypes=(o3d.core.float32,) * 3,
-            attr_channels=((1), (1), (3)),
+            attr_channels=[o3d.core.SizeVector([n]) for n in (1, 1, 3)],
             voxel_size=config.voxel_m,
             block_resolution=_BLOCK,
             block_count=_FIRST_BLOCKS,
@@ -57,9 +57,9 @@ class GroundMap:
     def add(self, image: GroundImage, T_ground_camera: SE3) -> None:
         """Take in a keyframe."""
         usable = np.where(_near_silhouette(image.depth), np.nan, image.depth)
-        depth = o3d.t.geometry.Image(o3d.core.Tensor(np.nan_to_num(usable)))
-        colour = o3d.t.geometry.Image(o3d.core.Tensor(image.colour.astype(np.float32)))
-        T_camera_ground = o3d.core.Tensor(T_ground_camera.inverse().matrix())
+        depth = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(np.nan_to_num(usable)))
+        colour = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(image.colour.astype(np.float32)))
+        T_camera_ground = o3d.core.Tensor.from_numpy(T_ground_camera.inverse().matrix())
         reach = (1.0, self._config.max_depth_m, self._config.truncation_m / self._config.voxel_m)
         blocks = self._grid.compute_unique_block_coordinates(
             depth, self._intrinsics, T_camera_ground, *reach

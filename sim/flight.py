@@ -147,8 +147,11 @@ def fly(plan: FlightPlan, step_s: float, field: MagneticField) -> RobotMotion:
 
 
 def _setpoint(plan: FlightPlan, index: int) -> Setpoint:
+    position, velocity, acceleration = plan.position[:, index]
     return Setpoint(
-        *plan.position[:, index],
+        position,
+        velocity,
+        acceleration,
         heading=float(plan.heading[0, index, 0]),
         heading_rate=float(plan.heading[1, index, 0]),
     )

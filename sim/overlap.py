@@ -123,10 +123,10 @@ def main(arguments: list[str]) -> None:
     scene = load_scene(arguments[0])
     for seed in map(int, arguments[1:] or ["0", "1", "2"]):
         shares = overlap_along_flight(build_world(scene, seed, pictures=False))
-        print(
+        sys.stdout.write(
             f"{scene.name} seed {seed}: median {np.median(shares):.2f}, lowest "
             f"{shares.min():.2f}, {(shares > 0.5).mean():.0%} of {len(shares)} maps above 0.5, "
-            f"first 12 {np.median(shares[:12]):.2f}"
+            f"first 12 {np.median(shares[:12]):.2f}\n"
         )
 
 
