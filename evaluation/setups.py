@@ -46,19 +46,27 @@ def with_localization(config: Config, **changes: object) -> Config:
     return Config.model_validate({**config.model_dump(), "localization": localization})
 
 
-def with_companions(primary: Setup) -> list[Setup]:
-    """The primary setup first, then what the report shows beside it."""
+def with_companions(primary: Setup, few: bool = False) -> list[Setup]:
+    """The primary setup first, then what the report shows beside it.
+
+    Args:
+        primary: What the user asked for.
+        few: Only the paper's constants beside it, with both readings of its sigma.
+    """
     best, published = Config(), paper()
     companions = [
-        Setup(best),
-        Setup(best, PAPER_DRIFT),
-        Setup(with_localization(best, heading="search")),
         Setup(published),
         Setup(
             with_localization(published, sigma_units="minmax"),
             variant="sigma 0.08 of the cost scaled to [0, 1]",
         ),
     ]
+    if not few:
+        companions += [
+            Setup(best),
+            Setup(best, PAPER_DRIFT),
+            Setup(with_localization(best, heading="search")),
+        ]
     known = (primary.config, primary.noise)
     return [primary, *(other for other in companions if (other.config, other.noise) != known)]
 

@@ -81,7 +81,7 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, OutWord):
         return Plan(
             scenes=[load_scene(scene) for scene in scenes],
             flights=self._count("flights", QUICK_FLIGHTS, FLIGHTS),
-            setups=[setup] if self.alone else with_companions(setup),
+            setups=[setup] if self.alone else with_companions(setup, few=self.quick),
             sensors=sensor_preset(self.sensors),
             protocol=Protocol(
                 sequences=self._count("sequences", QUICK_SEQUENCES, SEQUENCES),

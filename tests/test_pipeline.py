@@ -1,0 +1,192 @@
+"""Figure 4 on a world whose truth is exact: from images to the augmented map."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from airground.config import Config
+from airground.core.camera import PinholeCamera
+from airground.core.cloud import Source
+from airground.core.events import (
+    Aligned,
+    BeliefUpdated,
+    Event,
+    GroundMapExtended,
+    MapAugmented,
+    SurfaceCast,
+    TrackingLost,
+)
+from airground.core.messages import (
+    GroundImage,
+    ImuSamples,
+    MagneticSamples,
+    MavImage,
+    RobotCalibration,
+    Stamped,
+)
+from airground.core.se3 import SE3
+from airground.pipeline import FrontEnds, Pipeline
+from airground.slam.front_end import TrackedPose, Tracking
+from tests.dense.synthetic import CAMERA, flight, heap_world, noisy
+
+GROUND_CAMERA = PinholeCamera(320, 240, 262.0, 262.0, 159.5, 119.5)
+T_WORLD_MAV = SE3.from_heading(0.6, [1.5, -0.4, 0.8])
+"""The MAV's map frame, unknown to the pipeline; the frame `ground` is the world's."""
+NORTH = np.array([2e-5, 0.0, -4e-5])
+CALIBRATION = {
+    "mav": RobotCalibration(CAMERA, SE3.identity(), SE3.identity()),
+    "ground": RobotCalibration(GROUND_CAMERA, SE3.identity(), SE3.identity()),
+}
+
+
+class Known:
+    """A front end that was told the poses; None where it is lost."""
+
+    def __init__(self, poses: dict[int, SE3 | None]) -> None:
+        self.poses = poses
+
+    def add_imu(self, samples: ImuSamples) -> None:
+        raise AssertionError("nobody measured anything inertial here")
+
+    def track(self, image: MavImage | GroundImage) -> TrackedPose:
+        pose = self.poses[image.stamp_ns]
+        return TrackedPose(image.stamp_ns, Tracking.TRACKED if pose else Tracking.LOST, pose)
+
+
+class Recorded:
+    """Messages of both robots, and where their cameras were."""
+
+    def __init__(self) -> None:
+        rng = np.random.default_rng(5)
+        world = heap_world(1)
+        self.messages: list[Stamped] = []
+        self.mav: dict[int, SE3 | None] = {}
+        self.ground: dict[int, SE3 | None] = {}
+        for i, T_world_camera in enumerate(_around(24)):
+            stamp = i * 10_000_000
+            depth = world.depth(GROUND_CAMERA, T_world_camera).astype(np.float32)
+            depth = np.where(depth < 5, depth + rng.normal(0, 0.004, depth.shape), np.nan)
+            colour = np.full((*depth.shape, 3), 90, np.uint8)
+            self._add(Source.GROUND, GroundImage(stamp, colour, depth), T_world_camera)
+            self.ground[stamp] = T_world_camera
+        for i, T_world_camera in enumerate(flight(85, step_m=0.03)):
+            stamp = 1_000_000_000 + i * 33_000_000
+            image = noisy(world.grey(CAMERA, T_world_camera, supersample=1), rng)
+            self._add(Source.MAV, MavImage(stamp, image), T_world_camera)
+            self.mav[stamp] = T_WORLD_MAV.inverse() @ T_world_camera
+
+    def _add(self, robot: Source, image: MavImage | GroundImage, T_world_camera: SE3) -> None:
+        field = T_world_camera.rotation.T @ NORTH
+        stamps = image.stamp_ns - np.arange(5, 0, -1) * 1_000_000
+        samples = MagneticSamples(stamps, np.tile(field, (5, 1)))
+        self.messages += [Stamped(robot, samples), Stamped(robot, image)]
+
+    def run(self, prior: SE3 | None = None) -> tuple[Pipeline, list[Event]]:
+        front_ends = FrontEnds(Known(self.mav), Known(self.ground))
+        pipeline = Pipeline(
+            Config(),
+            CALIBRATION["mav"],
+            CALIBRATION["ground"],
+            front_ends,
+            np.random.default_rng(0),
+            prior,
+        )
+        return pipeline, list(pipeline.run(self.messages))
+
+
+def _around(count: int) -> Iterator[SE3]:
+    """Cameras on an ellipse around the heap, 1.3 m up, looking inwards and down.
+
+    The last one stands near the flight: the MAV is searched within 3 m of the ground robot.
+    """
+    for angle in np.linspace(-1.5 * np.pi, 0.5 * np.pi, count):
+        inward = -np.array([np.cos(angle), np.sin(angle), 0.35])
+        z = inward / np.linalg.norm(inward)
+        x = np.cross(z, [0, 0, 1])
+        x /= np.linalg.norm(x)
+        centre = np.array([0.8 + 3.2 * np.cos(angle), 2.4 * np.sin(angle), 1.3])
+        yield SE3(np.stack([x, np.cross(z, x), z], axis=1), centre)
+
+
+def offset(T_ground_mav: SE3, recorded: Recorded) -> tuple[float, float]:
+    """Error of the MAV's last camera pose [m, deg]."""
+    camera = next(pose for pose in reversed(recorded.mav.values()) if pose is not None)
+    error = (T_WORLD_MAV @ camera).inverse() @ (T_ground_mav @ camera)
+    return float(np.linalg.norm(error.translation)), float(np.rad2deg(error.angle()))
+
+
+@pytest.fixture(scope="module")
+def recorded() -> Recorded:
+    return Recorded()
+
+
+@pytest.fixture(scope="module")
+def found(recorded: Recorded) -> tuple[Pipeline, list[Event]]:
+    return recorded.run()
+
+
+def of(events: list[Event], kind: type) -> list:
+    return [event for event in events if isinstance(event, kind)]
+
+
+@pytest.mark.slow
+def test_locates_refines_and_augments(
+    recorded: Recorded, found: tuple[Pipeline, list[Event]]
+) -> None:
+    pipeline, events = found
+    assert len(of(events, SurfaceCast)) >= 2
+    belief = of(events, BeliefUpdated)[-1].belief
+    assert belief.converged, belief.refusal
+    assert offset(belief.T_ground_mav, recorded)[0] < 0.15
+    alignment = of(events, Aligned)[-1].alignment
+    assert alignment.accepted, alignment.refusal
+    metres, degrees = offset(alignment.T_ground_mav, recorded)
+    assert metres < 0.015
+    assert degrees < 0.5
+    augmented = pipeline.augmented_map()
+    assert set(augmented.sources) == {Source.GROUND, Source.MAV}
+    assert of(events, MapAugmented)
+
+
+@pytest.mark.slow
+def test_stages_report_in_the_order_of_figure_4(found: tuple[Pipeline, list[Event]]) -> None:
+    kinds = [type(event) for event in found[1]]
+    order = [GroundMapExtended, SurfaceCast, BeliefUpdated, Aligned, MapAugmented]
+    first = [kinds.index(kind) for kind in order]
+    assert first == sorted(first)
+
+
+@pytest.mark.slow
+def test_a_prior_skips_the_global_search(recorded: Recorded) -> None:
+    prior = SE3.from_heading(0.02, [0.15, -0.1, 0.1]) @ T_WORLD_MAV
+    _, events = recorded.run(prior)
+    assert not of(events, BeliefUpdated)
+    assert offset(of(events, Aligned)[-1].alignment.T_ground_mav, recorded)[0] < 0.015
+
+
+@pytest.mark.slow
+def test_same_seed_same_bytes(recorded: Recorded, found: tuple[Pipeline, list[Event]]) -> None:
+    _, again = recorded.run()
+    for one, two in zip(of(found[1], Aligned), of(again, Aligned), strict=True):
+        one_bytes = one.alignment.T_ground_mav.matrix().tobytes()
+        assert one_bytes == two.alignment.T_ground_mav.matrix().tobytes()
+
+
+@pytest.mark.slow
+def test_lost_tracking_is_told_and_maps_nothing(recorded: Recorded) -> None:
+    lost = dict.fromkeys(recorded.mav)
+    front_ends = FrontEnds(Known(lost), Known(recorded.ground))
+    pipeline = Pipeline(
+        Config(),
+        CALIBRATION["mav"],
+        CALIBRATION["ground"],
+        front_ends,
+        np.random.default_rng(0),
+    )
+    events = list(pipeline.run(recorded.messages))
+    assert len(of(events, TrackingLost)) == len(lost)
+    assert not of(events, SurfaceCast)
+    assert (pipeline.augmented_map().sources == Source.GROUND).all()
