@@ -52,7 +52,7 @@ def map_recording(recording: Recording, truth: Truth, setup: Setup, seed: int) -
     front_ends = oracle_front_ends(recording, truth, setup.noise, rng)
     mapping = Mapping(setup.config, recording.mav, recording.ground, front_ends)
     maps = Maps()
-    newest: DepthMap | None = None
+    made: dict[int, DepthMap] = {}
     fused: list[DepthMap] = []
     started = time.perf_counter()
     for event, duration_ms in timed(_events(recording, mapping)):
@@ -64,9 +64,9 @@ def map_recording(recording: Recording, truth: Truth, setup: Setup, seed: int) -
             case GroundTracked():
                 maps.paths["ground"].append((event.stamp_ns, event.T_ground_camera))
             case DepthMapMade():
-                newest = event.depth_map
-            case FieldAdded() if newest is not None:
-                fused.append(newest)
+                made[event.depth_map.stamp_ns] = event.depth_map
+            case FieldAdded():
+                fused.append(made.pop(event.reference_stamp_ns))
             case SurfaceCast():
                 sighting = sight(event.surface, mapping)
                 if sighting is not None:

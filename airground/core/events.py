@@ -65,7 +65,13 @@ class DepthMapMade(Event):
 
 @dataclass(frozen=True)
 class FieldAdded(Event):
-    """A depth map went into the histogram of distance fields (Sec. V)."""
+    """A depth map went into the histogram of distance fields (Sec. V).
+
+    Attributes:
+        reference_stamp_ns: Which depth map: that of this reference view.
+    """
+
+    reference_stamp_ns: int
 
 
 @dataclass(frozen=True)

@@ -158,7 +158,7 @@ class DenseReconstruction:
         self._counts = histogram.counts
         for depth_map in depth_maps:
             histogram.add(depth_map)
-            yield FieldAdded(self._newest_ns)
+            yield FieldAdded(self._newest_ns, depth_map.stamp_ns)
         phi = self._fusion.fuse(histogram.counts)
         yield VolumeFused(self._newest_ns)
         depth, normals = cast_surface(
