@@ -25,6 +25,7 @@ def random_points(rng, n=500):
     return points
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize("cells_per_m", [10.0, 25.0])
 def test_each_cell_holds_its_highest_point(cells_per_m):
     points = random_points(np.random.default_rng(1))
@@ -36,6 +37,7 @@ def test_each_cell_holds_its_highest_point(cells_per_m):
         assert height_map.heights[tuple(np.array(cell) - first)] == z
 
 
+@pytest.mark.kernel
 def test_dilation_fills_holes_by_the_highest_neighbour_and_changes_nothing_else():
     points = random_points(np.random.default_rng(2), 150)
     raw = make_height_map(points, 10.0, dilate_holes=False).heights
@@ -51,6 +53,7 @@ def test_dilation_fills_holes_by_the_highest_neighbour_and_changes_nothing_else(
         np.testing.assert_equal(filled[ix, iy], np.float32(expected))
 
 
+@pytest.mark.kernel
 def test_a_window_cuts_the_same_lattice():
     points = random_points(np.random.default_rng(3))
     whole = make_height_map(points, 20.0, dilate_holes=False)

@@ -44,6 +44,7 @@ def slow_votes(volume: Volume, seen: DepthMap, truncation: float, bins: int) -> 
     return counts
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize("bins", [8, 5])
 def test_votes_equal_the_loops(bins: int) -> None:
     rng = np.random.default_rng(0)

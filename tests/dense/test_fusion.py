@@ -83,6 +83,7 @@ def test_prox_equals_a_numerical_minimizer(counts: list[int], v: float, weight: 
     assert prox(np.float32(v), word, np.float32(weight), spacing) == pytest.approx(best, abs=2e-4)
 
 
+@pytest.mark.kernel
 def test_fusion_equals_the_loops() -> None:
     rng = np.random.default_rng(0)
     counts = rng.integers(0, 4, (5, 6, 9, 8)) * (rng.random((5, 6, 9, 1)) > 0.3)

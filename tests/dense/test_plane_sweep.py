@@ -51,6 +51,7 @@ def slow_add(
     return costs, sampled
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize("centre", [(0.11, 0.02, 0.0), (-0.06, 0.09, 0.05), (0.0, -0.1, -0.07)])
 def test_sweep_equals_the_loops(centre: tuple[float, float, float]) -> None:
     rng = np.random.default_rng(0)
@@ -99,6 +100,7 @@ def test_impossible_range_is_refused(limits: tuple[float, float]) -> None:
         inverse_depth_planes(*limits, 10)
 
 
+@pytest.mark.kernel
 @given(scale=st.floats(1.85, 2.15), shift=st.floats(-40, 40))
 def test_runs_tile_the_row(scale: float, shift: float) -> None:
     starts, offsets, fractions = plan_columns(np.array([scale]), np.array([shift]), 200)

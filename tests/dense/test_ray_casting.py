@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from airground.core.se3 import SE3
@@ -36,6 +37,7 @@ def slow_crossing(
     return np.nan
 
 
+@pytest.mark.kernel
 def test_scan_equals_a_loop_over_columns() -> None:
     rng = np.random.default_rng(0)
     volume = Volume(resized(CAMERA, 12, 9), SE3.identity(), 1.0, 2.0, 14)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 
 from airground.config import PlaneSweep as Parameters
@@ -43,6 +44,7 @@ def slow_smooth(mean: NDArray, image: NDArray, parameters: Parameters) -> NDArra
     return total
 
 
+@pytest.mark.kernel
 def test_smoothing_equals_the_recurrence() -> None:
     rng = np.random.default_rng(0)
     mean = rng.integers(0, 5120, (9, 37, 12)).astype(np.uint16)

@@ -47,6 +47,7 @@ def test_all_offsets_equal_a_naive_double_loop(cost, seed):
     np.testing.assert_allclose(found.costs, expected, rtol=1e-4, atol=2e-6)
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize("cost", ["zmssd", "ncc"])
 def test_particles_equal_naive_interpolation(cost):
     rng = np.random.default_rng(5)
