@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Verb:
+class Verb(ABC):
     """A verb of the command line."""
 
     verbose: bool = False
@@ -33,9 +34,9 @@ class Verb:
         """How many threads or processes to use."""
         return self.threads or usable_cores()
 
+    @abstractmethod
     def main(self) -> int | None:
         """Do it; returns the exit code, None for 0."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True)
