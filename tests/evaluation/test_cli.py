@@ -184,5 +184,5 @@ def test_in_range_refuses_what_is_no_number() -> None:
 
 
 def test_a_verb_must_say_what_it_does() -> None:
-    with pytest.raises(NotImplementedError):
-        Verb().main()
+    with pytest.raises(TypeError, match="abstract"):
+        Verb()  # type: ignore[abstract]
