@@ -16,6 +16,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from airground.core.messages import GroundImage, ImuSamples, MavImage
 from airground.core.se3 import SE3
+from airground.core.trajectory import Trajectory
 from airground.io.recording import Recording
 from airground.pipeline import FrontEnds
 from airground.slam.front_end import TrackedPose, Tracking
@@ -92,6 +93,7 @@ class Oracle:
         right = start.rotation[:, 0]
         heading = float(np.arctan2(right[1], right[0]))
         self._T_map_world = SE3.from_heading(heading, start.translation).inverse()
+        self._tracked: list[tuple[int, SE3]] = []
 
     def add_imu(self, samples: ImuSamples) -> None:
         """An oracle needs no inertial measurements."""
@@ -102,7 +104,18 @@ class Oracle:
         error = self._drift[image.stamp_ns] + self._rng.normal(0, self._noise.white_m, 3)
         turn = SE3.from_rotation_vector(self._rng.normal(0, np.deg2rad(self._noise.white_deg), 3))
         T = SE3(T.rotation, T.translation + error) @ turn
+        self._tracked.append((image.stamp_ns, T))
         return TrackedPose(image.stamp_ns, Tracking.TRACKED, T)
+
+    def finish(self) -> None:
+        """An oracle puts nothing off."""
+
+    def trajectory(self) -> Trajectory | None:
+        """The poses as they were returned."""
+        if not self._tracked:
+            return None
+        stamps, poses = zip(*self._tracked, strict=True)
+        return Trajectory.from_poses(list(stamps), list(poses))
 
 
 def oracle_front_ends(

@@ -106,6 +106,23 @@ class MagneticSamples:
 
 
 @dataclass(frozen=True)
+class ImuNoise:
+    """How much an inertial sensor errs, as its data sheet says.
+
+    Attributes:
+        gyro_noise_density: [rad/s/sqrt(Hz)]
+        gyro_bias_walk: [rad/s^2/sqrt(Hz)]
+        accelerometer_noise_density: [m/s^2/sqrt(Hz)]
+        accelerometer_bias_walk: [m/s^3/sqrt(Hz)]
+    """
+
+    gyro_noise_density: float
+    gyro_bias_walk: float
+    accelerometer_noise_density: float
+    accelerometer_bias_walk: float
+
+
+@dataclass(frozen=True)
 class RobotCalibration:
     """What the pipeline is told about one robot's sensors (slightly wrong, as in life).
 
@@ -113,11 +130,16 @@ class RobotCalibration:
         camera: Intrinsics of its camera.
         T_imu_camera: The camera in the IMU's frame.
         T_body_imu: The IMU in the robot's body (x forward, z up).
+        imu: Noise of the inertial sensor; None where the robot has none, or no gyro.
+        camera_time_offset_ns: What to add to a stamp of the camera to get the time on the
+            IMU's clock [ns].
     """
 
     camera: PinholeCamera
     T_imu_camera: SE3
     T_body_imu: SE3
+    imu: ImuNoise | None = None
+    camera_time_offset_ns: int = 0
 
 
 Message = MavImage | GroundImage | ImuSamples | MagneticSamples

@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from airground.core.camera import PinholeCamera
-from airground.core.messages import RobotCalibration
+from airground.core.messages import ImuNoise, RobotCalibration
 from airground.core.se3 import SE3
 
 Positive = Annotated[float, Field(gt=0)]
@@ -84,6 +84,14 @@ class ImuTable(Table):
     accelerometer_bias_walk: Positive
     """[m/s^3/sqrt(Hz)]"""
 
+    def noise(self) -> ImuNoise:
+        return ImuNoise(
+            self.gyro_noise_density,
+            self.gyro_bias_walk,
+            self.accelerometer_noise_density,
+            self.accelerometer_bias_walk,
+        )
+
 
 class MagnetometerTable(Table):
     """Rate and noise of a magnetometer, as its data sheet says."""
@@ -114,6 +122,8 @@ class RobotTable(Table):
             camera=self.camera.pinhole(),
             T_imu_camera=SE3.from_matrix(self.T_imu_camera),
             T_body_imu=SE3.from_matrix(self.T_body_imu),
+            imu=self.imu.noise(),
+            camera_time_offset_ns=self.camera.time_offset_ns,
         )
 
 

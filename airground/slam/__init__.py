@@ -1,1 +1,1 @@
-"""Section IV: where each robot's camera is."""
+"""Where each robot is, by its own sensors (Sec. IV)."""

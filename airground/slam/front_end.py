@@ -10,8 +10,13 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.arrays import read_only
 from airground.core.messages import GroundImage, ImuSamples, MavImage
 from airground.core.se3 import SE3
+from airground.core.trajectory import Trajectory
 
 
 class Tracking(Enum):
@@ -23,6 +28,19 @@ class Tracking(Enum):
 
 
 @dataclass(frozen=True)
+class ScaleEstimate:
+    """How well the metric scale of a map is known.
+
+    Attributes:
+        sigma: Standard deviation of the scale, as a share of it.
+        observable: Whether the motion so far makes scale observable at all.
+    """
+
+    sigma: float
+    observable: bool
+
+
+@dataclass(frozen=True, eq=False)
 class TrackedPose:
     """Where the camera was when one image was taken.
 
@@ -31,11 +49,29 @@ class TrackedPose:
         tracking: Whether the pose can be used.
         T_map_camera: The camera in the robot's own map (`mav` or `ground`): metric, z up
             against gravity. None unless tracked.
+        covariance: (6, 6) of the pose error in the map's axes: position [m], then rotation
+            vector of estimate times inverse truth [rad]. None where the front end has none.
+        scale: How well the metric scale is known; None where depth or a file gives it.
+        depth_range: Nearest and farthest map point in this image, along the optical axis
+            [m] (Sec. VIII-B). None where the front end has no map.
+        corrected: Whether the map changed with this image, and earlier poses with it:
+            `FrontEnd.trajectory` has them.
     """
 
     stamp_ns: int
     tracking: Tracking
     T_map_camera: SE3 | None
+    covariance: NDArray[np.float64] | None = None
+    scale: ScaleEstimate | None = None
+    depth_range: tuple[float, float] | None = None
+    corrected: bool = False
+
+    def __post_init__(self) -> None:
+        if (self.tracking is Tracking.TRACKED) != (self.T_map_camera is not None):
+            raise ValueError("a pose is there exactly when the image was tracked")
+        if self.covariance is not None:
+            covariance = read_only(self.covariance, "covariance", (6, 6), np.float64)
+            object.__setattr__(self, "covariance", covariance)
 
 
 Image_contra = TypeVar("Image_contra", MavImage, GroundImage, contravariant=True)
@@ -49,3 +85,12 @@ class FrontEnd(Protocol[Image_contra]):
 
     def track(self, image: Image_contra) -> TrackedPose:
         """Where the camera was when `image` was taken."""
+
+    def finish(self) -> None:
+        """There are no more images: optimize what was put off."""
+
+    def trajectory(self) -> Trajectory | None:
+        """Every image tracked so far, at the pose that is believed now; None before the first.
+
+        Live poses, once returned by `track`, stay as they are; these follow corrections.
+        """
