@@ -20,6 +20,55 @@ class Section(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
+class KeyframeSlam(Section):
+    """Keyframe-based SLAM, one of these for each robot (Sec. IV)."""
+
+    corners: Count = 250
+    """Corners followed at a time."""
+    corner_spacing_px: Count = 26
+    """They are at least this far apart when chosen [px]."""
+    corner_sigma_px: Positive = 0.7
+    """Standard deviation of a corner's place [px]."""
+    patch_px: Count = 17
+    """Side of the patch around a corner that is compared [px]."""
+    keyframe_parallax_px: Positive = 22.0
+    """A frame becomes a keyframe when its points moved this far, turning apart [px] ..."""
+    keyframe_share: Fraction = 0.6
+    """... or when fewer than this share of the last keyframe's corners is left ..."""
+    keyframe_interval_s: Positive = 0.5
+    """... or, with an IMU, after this time: preintegration does not stay linear for ever [s]."""
+    window: Count = 10
+    """Keyframes that local bundle adjustment moves ..."""
+    fixed_keyframes: Count = 12
+    """... and older ones that saw the same points and hold them."""
+    iterations: Count = 6
+    """Most steps of local bundle adjustment."""
+    min_parallax_deg: Positive = 1.0
+    """Rays of a point must cross under this angle before it enters the map [deg]."""
+    min_points: Count = 15
+    """Fewer map points than this in an image, and tracking is lost."""
+    reused_keyframes: Annotated[int, Field(ge=0, le=10)] = 3
+    """Old keyframes whose points are looked for in a new one; 0 never returns to old points."""
+
+
+class MonocularSlam(KeyframeSlam):
+    """The MAV's SLAM: one camera and an IMU."""
+
+    scale: Literal["tight", "filter"] = "tight"
+    """Metric scale by preintegrated inertial factors in bundle adjustment, or by a Kalman
+    filter beside visual odometry, as published."""
+
+
+class RgbdSlam(KeyframeSlam):
+    """The ground robot's SLAM: colour and depth."""
+
+    keyframe_parallax_px: Positive = 40.0
+    depth_noise_per_m: Positive = 0.003
+    """Standard deviation of inverse depth as measured [1/m]."""
+    max_depth_m: Positive = 5.0
+    """Depth beyond this does not start a point [m]."""
+
+
 class ViewSelection(Section):
     """Which frames make a depth map, and which depth maps a surface (Sec. VIII-B)."""
 
@@ -182,6 +231,8 @@ class Config(Section):
     """The whole pipeline."""
 
     preset: Literal["paper", "best"] = "best"
+    monocular_slam: MonocularSlam = MonocularSlam()
+    rgbd_slam: RgbdSlam = RgbdSlam()
     view_selection: ViewSelection = ViewSelection()
     plane_sweep: PlaneSweep = PlaneSweep()
     fusion: Fusion = Fusion()
@@ -195,6 +246,7 @@ def paper() -> Config:
     """The constants as published; what the paper leaves open stays at our defaults."""
     return Config(
         preset="paper",
+        monocular_slam=MonocularSlam(scale="filter"),
         view_selection=ViewSelection(both_sides=False),
         plane_sweep=PlaneSweep(window_px=5, smoothing="none"),
         fusion=Fusion(min_observations=1),

@@ -1,0 +1,73 @@
+"""The corners that are followed from image to image."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.slam.optical_flow import flow
+
+NOTHING = np.empty((0, 2), np.float32)
+
+
+class FeatureTracker:
+    """Corners of the newest image, each with the number of its map point.
+
+    Args:
+        window_px: Side of the patches that are compared.
+        levels: Pyramid levels above the full resolution, with a good prediction.
+
+    Attributes:
+        image: The newest image; None before the first.
+        ids: (N,) numbers of the points.
+        pixels: (N, 2) float32 where they are.
+        failures: (N,) images in a row in which a point did not fit the pose.
+    """
+
+    def __init__(self, window_px: int, levels: int) -> None:
+        self._window_px = window_px
+        self._levels = levels
+        self.clear()
+
+    def clear(self) -> None:
+        """Follow nothing any more."""
+        self.image: NDArray[np.uint8] | None = None
+        self.ids = np.empty(0, np.int64)
+        self.pixels = NOTHING
+        self.failures = np.empty(0, np.int64)
+
+    def advance(self, image: NDArray[np.uint8], start: NDArray, extra_levels: int = 0) -> None:
+        """Follow every corner into the next image; those not found are given up.
+
+        Args:
+            image: (height, width) grey.
+            start: (N, 2) where the corners are expected.
+            extra_levels: More pyramid levels, where the expectation is poor.
+        """
+        if self.image is not None and len(self.ids):
+            levels = self._levels + extra_levels
+            pixels, found = flow(
+                self.image, image, self.pixels, start.astype(np.float32), self._window_px, levels
+            )
+            self.pixels = pixels
+            self.keep(found)
+        self.image = image
+
+    def keep(self, kept: NDArray[np.bool_]) -> None:
+        """Give up all but the marked corners."""
+        self.ids, self.pixels = self.ids[kept], self.pixels[kept]
+        self.failures = self.failures[kept]
+
+    def judge(self, ids: NDArray[np.int64], fits: NDArray[np.bool_], patience: int) -> None:
+        """Note which points fitted the pose; give up those that failed `patience` times."""
+        where = np.isin(self.ids, ids)
+        fitted = np.isin(self.ids, ids[fits])
+        self.failures[where & ~fitted] += 1
+        self.failures[fitted] = 0
+        self.keep(self.failures < patience)
+
+    def add(self, ids: NDArray[np.int64], pixels: NDArray) -> None:
+        """Follow further corners of the newest image."""
+        self.ids = np.concatenate([self.ids, ids])
+        self.pixels = np.concatenate([self.pixels, np.asarray(pixels, np.float32).reshape(-1, 2)])
+        self.failures = np.concatenate([self.failures, np.zeros(len(ids), np.int64)])

@@ -1,0 +1,79 @@
+"""Where corners of one image lie in another (Lucas and Kanade, in pyramids)."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+MAX_DIFFERENCE = 22.0
+"""Mean absolute difference of two patches that may still be the same [grey levels]."""
+MIN_BRIGHTNESS = 4.0
+"""A darker image shows nothing [grey levels]."""
+BORDER_PX = 4.0
+
+
+def flow(
+    image: NDArray[np.uint8],
+    other: NDArray[np.uint8],
+    pixels: NDArray[np.float32],
+    start: NDArray[np.float32],
+    window_px: int,
+    levels: int,
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Follow corners from `image` to `other`.
+
+    Args:
+        image, other: (height, width) grey; a difference in exposure is taken out first.
+        pixels: (N, 2) corners in `image`.
+        start: (N, 2) where to begin the search in `other`: good predictions need few levels.
+        window_px: Side of the patches.
+        levels: Pyramid levels above the full resolution.
+
+    Returns:
+        (N, 2) corners in `other` and (N,) which of them were found.
+    """
+    if len(pixels) == 0 or min(cv2.mean(image)[0], cv2.mean(other)[0]) < MIN_BRIGHTNESS:
+        return start.copy(), np.zeros(len(pixels), bool)
+    found_px, status, difference = cv2.calcOpticalFlowPyrLK(
+        image,
+        exposed_alike(other, image),
+        np.ascontiguousarray(pixels, np.float32).reshape(-1, 1, 2),
+        np.array(start, np.float32).reshape(-1, 1, 2),
+        winSize=(window_px, window_px),
+        maxLevel=levels,
+        criteria=(cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 0.02),
+        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
+        minEigThreshold=1e-3,
+    )
+    found_px = found_px.reshape(-1, 2)
+    height, width = image.shape
+    inside = (found_px >= BORDER_PX).all(axis=1)
+    inside &= (found_px[:, 0] < width - BORDER_PX) & (found_px[:, 1] < height - BORDER_PX)
+    found = (status.ravel() == 1) & inside & (difference.ravel() < MAX_DIFFERENCE)
+    return found_px, found
+
+
+def flow_both_ways(
+    image: NDArray[np.uint8],
+    other: NDArray[np.uint8],
+    pixels: NDArray[np.float32],
+    start: NDArray[np.float32],
+    window_px: int,
+    levels: int,
+    max_return_px: float,
+) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """`flow`, keeping only corners that come back to where they began."""
+    there, found = flow(image, other, pixels, start, window_px, levels)
+    back, found_back = flow(other, image, there[found], pixels[found], window_px, 0)
+    returned = np.linalg.norm(back - pixels[found], axis=1) < max_return_px
+    found[found] = found_back & returned
+    return there, found
+
+
+def exposed_alike(image: NDArray[np.uint8], like: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """`image` with the mean brightness of `like`; itself where they hardly differ."""
+    gain = cv2.mean(like)[0] / max(cv2.mean(image)[0], 1.0)
+    if abs(gain - 1.0) < 0.02:
+        return image
+    return cv2.convertScaleAbs(image, alpha=gain)

@@ -1,0 +1,121 @@
+"""The sparse map: keyframes, points, and which keyframe saw which point where."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FIRST_POINTS = 4096
+CANDIDATE, MAPPED, DROPPED = 0, 1, 2
+"""State of a point: seen but without a position yet, in the map, found to be wrong."""
+
+
+@dataclass(eq=False)
+class Keyframe:
+    """One image that stays, its state, and what it saw.
+
+    Attributes:
+        stamp_ns: Of the image.
+        image: (height, width) uint8 grey.
+        rotation, position: `T_map_rig`, the rig being the IMU.
+        velocity: (3,) of the rig in the map [m/s].
+        gyro_bias, accelerometer_bias: (3,) [rad/s], [m/s^2].
+        ids: (n,) int64 points seen, each once.
+        pixels: (n, 2) float64 where.
+        inverse_depths: (n,) [1/m], measured by a depth camera; NaN where it was not.
+        still: Whether the robot was at rest.
+    """
+
+    stamp_ns: int
+    image: NDArray[np.uint8]
+    rotation: NDArray[np.float64]
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    gyro_bias: NDArray[np.float64]
+    accelerometer_bias: NDArray[np.float64]
+    ids: NDArray[np.int64]
+    pixels: NDArray[np.float64]
+    inverse_depths: NDArray[np.float64]
+    still: bool = False
+
+    def see(self, ids: NDArray, pixels: NDArray, inverse_depths: NDArray) -> None:
+        """Add observations of points that this keyframe does not have yet."""
+        self.ids = np.concatenate([self.ids, ids])
+        self.pixels = np.concatenate([self.pixels, pixels])
+        self.inverse_depths = np.concatenate([self.inverse_depths, inverse_depths])
+
+    def forget(self, wrong: NDArray[np.bool_]) -> None:
+        """Drop observations, (n,) marked."""
+        self.ids = self.ids[~wrong]
+        self.pixels = self.pixels[~wrong]
+        self.inverse_depths = self.inverse_depths[~wrong]
+
+
+class SparseMap:
+    """Keyframes in order of time, and points by their number.
+
+    Attributes:
+        keyframes: All of them.
+        positions: (capacity, 3) of the points in the map [m]; only those MAPPED count.
+        states: (capacity,) CANDIDATE, MAPPED or DROPPED.
+        origins: (capacity,) index of the keyframe in which a point was first seen.
+    """
+
+    def __init__(self) -> None:
+        self.keyframes: list[Keyframe] = []
+        self.positions = np.zeros((FIRST_POINTS, 3))
+        self.states = np.zeros(FIRST_POINTS, np.int8)
+        self.origins = np.zeros(FIRST_POINTS, np.int64)
+        self._count = 0
+
+    def __len__(self) -> int:
+        """Points that were ever made."""
+        return self._count
+
+    def new_points(self, count: int, origin: int) -> NDArray[np.int64]:
+        """Numbers of `count` new candidates, first seen in keyframe `origin`."""
+        while self._count + count > len(self.states):
+            self.positions = np.concatenate([self.positions, np.zeros_like(self.positions)])
+            self.states = np.concatenate([self.states, np.zeros_like(self.states)])
+            self.origins = np.concatenate([self.origins, np.zeros_like(self.origins)])
+        ids = np.arange(self._count, self._count + count)
+        self.origins[ids] = origin
+        self._count += count
+        return ids
+
+    def place(self, ids: NDArray[np.int64], positions: NDArray[np.float64]) -> None:
+        """Give candidates a position; from now on they are in the map."""
+        self.positions[ids] = positions
+        self.states[ids] = MAPPED
+
+    def mapped(self, ids: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """(n,) whether the points are in the map."""
+        return self.states[ids] == MAPPED
+
+    def drop(self, ids: NDArray[np.int64]) -> None:
+        """Take points out for good."""
+        self.states[ids] = DROPPED
+
+    def seen_by(self, keyframes: list[int]) -> NDArray[np.int64]:
+        """Numbers of all points in the map that one of the keyframes saw, sorted."""
+        if not keyframes:
+            return np.empty(0, np.int64)
+        ids = np.unique(np.concatenate([self.keyframes[k].ids for k in keyframes]))
+        return ids[self.mapped(ids)]
+
+    def shared(self, ids: NDArray[np.int64]) -> NDArray[np.int64]:
+        """(K,) how many of the points each keyframe saw."""
+        wanted = np.zeros(len(self.states), bool)
+        wanted[ids] = True
+        return np.array([int(wanted[keyframe.ids].sum()) for keyframe in self.keyframes])
+
+    def move(self, scale: float, rotation: NDArray, translation: NDArray) -> None:
+        """Move the whole map: x -> scale * rotation @ x + translation."""
+        for keyframe in self.keyframes:
+            keyframe.rotation = rotation @ keyframe.rotation
+            keyframe.position = scale * rotation @ keyframe.position + translation
+            keyframe.velocity = scale * rotation @ keyframe.velocity
+        n = self._count
+        self.positions[:n] = scale * self.positions[:n] @ rotation.T + translation
