@@ -1,0 +1,195 @@
+"""The compiled sum of inertial samples into one relative motion.
+
+Forster, Carlone, Dellaert and Scaramuzza, "On-manifold preintegration for real-time
+visual-inertial odometry", T-RO 2017, with the mean of both ends of each step in place of its
+start (the midpoint rule).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from airground.slam.so3 import exp, right_jacobian
+
+Sums = tuple[NDArray, NDArray, NDArray, NDArray, NDArray, float]
+
+
+@njit(cache=True, error_model="numpy")
+def _interpolated(
+    stamps: NDArray[np.int64], readings: NDArray, stamp: int, after: int
+) -> NDArray[np.float64]:
+    """(6,) reading at `stamp`, which lies before sample `after`; the nearest one at the ends."""
+    if after == 0:
+        return readings[0].copy()
+    if after == len(stamps):
+        return readings[after - 1].copy()
+    before = after - 1
+    share = (stamp - stamps[before]) / (stamps[after] - stamps[before])
+    return (1.0 - share) * readings[before] + share * readings[after]
+
+
+@njit(cache=True, error_model="numpy")
+def _product(a: NDArray, b: NDArray, out: NDArray) -> None:
+    """out = a @ b for (3, 3) and (3, n); BLAS takes longer to call than this to run."""
+    for i in range(3):
+        for j in range(b.shape[1]):
+            out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
+
+
+@njit(cache=True, error_model="numpy")
+def _turned_force(rotation: NDArray, force: NDArray, out: NDArray) -> None:
+    """out = rotation @ hat(force): how the turned force changes with the rotation, negated."""
+    x, y, z = force[0], force[1], force[2]
+    for i in range(3):
+        out[i, 0] = rotation[i, 1] * z - rotation[i, 2] * y
+        out[i, 1] = rotation[i, 2] * x - rotation[i, 0] * z
+        out[i, 2] = rotation[i, 0] * y - rotation[i, 1] * x
+
+
+@njit(cache=True, error_model="numpy")
+def _propagate(
+    covariance: NDArray, turn: NDArray, lever: NDArray, dt: float, rows: NDArray, lean: NDArray
+) -> None:
+    """covariance <- F covariance F^T for the 9 x 9 transition F of one step.
+
+    F = [turn^T 0 0; dt lever, 1, 0; dt^2/2 lever, dt, 1]. It is applied to the rows twice,
+    with a transpose in between.
+    """
+    turn_back = turn.T
+    for _ in range(2):
+        _product(turn_back, covariance[:3], rows)
+        _product(lever, covariance[:3], lean)
+        for i in range(3):
+            for j in range(9):
+                velocity = covariance[3 + i, j]
+                covariance[i, j] = rows[i, j]
+                covariance[3 + i, j] = velocity + dt * lean[i, j]
+                covariance[6 + i, j] += dt * velocity + 0.5 * dt * dt * lean[i, j]
+        for i in range(9):
+            for j in range(i):
+                covariance[i, j], covariance[j, i] = covariance[j, i], covariance[i, j]
+
+
+@njit(cache=True, error_model="numpy")
+def _add_noise(
+    covariance: NDArray, jacobian: NDArray, tilt: NDArray, dt: float, gyro: float, force: float
+) -> None:
+    """Add the white noise of one step; `gyro` and `force` are squared densities.
+
+    Both ends of the step share its noise, so that a run of steps has the density's variance.
+    Turning the force's noise, alike on all axes, does not change it.
+    """
+    for i in range(3):
+        for j in range(3):
+            turned, swept, leant = 0.0, 0.0, 0.0
+            for k in range(3):
+                turned += jacobian[i, k] * jacobian[j, k]
+                swept += tilt[i, k] * jacobian[j, k]
+                leant += tilt[i, k] * tilt[j, k]
+            turned, swept, leant = gyro * dt * turned, gyro * swept, gyro / dt * leant
+            covariance[i, j] += turned
+            covariance[3 + i, j] += dt * swept
+            covariance[j, 3 + i] += dt * swept
+            covariance[6 + i, j] += 0.5 * dt * dt * swept
+            covariance[j, 6 + i] += 0.5 * dt * dt * swept
+            white = leant + (force / dt if i == j else 0.0)
+            covariance[3 + i, 3 + j] += dt * dt * white
+            covariance[3 + i, 6 + j] += 0.5 * dt**3 * white
+            covariance[6 + i, 3 + j] += 0.5 * dt**3 * white
+            covariance[6 + i, 6 + j] += 0.25 * dt**4 * white
+
+
+@njit(cache=True, error_model="numpy")
+def preintegrate(
+    stamps: NDArray[np.int64],
+    readings: NDArray[np.float64],
+    start: int,
+    end: int,
+    gyro_bias: NDArray[np.float64],
+    accelerometer_bias: NDArray[np.float64],
+    gyro_density: float,
+    accelerometer_density: float,
+) -> Sums:
+    """Rotation, velocity, position, five Jacobians, covariance and the longest gap [s].
+
+    Args:
+        stamps: (N,) increasing [ns]; N >= 1.
+        readings: (N, 6) gyro [rad/s] and accelerometer [m/s^2].
+        start, end: The times between which to integrate [ns].
+        gyro_bias, accelerometer_bias: (3,) taken off the readings.
+        gyro_density, accelerometer_density: Of the white noise.
+
+    Returns:
+        (3, 3), (3,), (3,), (5, 3, 3), (9, 9), float. The Jacobians are of the rotation and
+        velocity by the gyro's bias, of the velocity by the accelerometer's, of the position
+        by both.
+    """
+    rotation, velocity, position = np.eye(3), np.zeros(3), np.zeros(3)
+    jacobians, covariance = np.zeros((5, 3, 3)), np.zeros((9, 9))
+    first = int(np.searchsorted(stamps, start, side="right"))
+    last = int(np.searchsorted(stamps, end, side="left"))
+    before, lever, tilt = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    product, rows, lean = np.empty((3, 3)), np.empty((3, 9)), np.empty((3, 9))
+    force = np.empty(3)
+    reading, stamp = _interpolated(stamps, readings, start, first), start
+    reading[:3] -= gyro_bias
+    reading[3:] -= accelerometer_bias
+    for index in range(first, last + 1):
+        if index < last:
+            following, next_stamp = readings[index].copy(), stamps[index]
+        else:
+            following, next_stamp = _interpolated(stamps, readings, end, last), end
+        following[:3] -= gyro_bias
+        following[3:] -= accelerometer_bias
+        dt = (next_stamp - stamp) * 1e-9
+        if dt <= 0.0:
+            continue
+        rate = 0.5 * (reading[:3] + following[:3])
+        turn, jacobian = exp(dt * rate), right_jacobian(dt * rate)
+        turned = np.empty((3, 3))
+        _product(rotation, turn, turned)
+
+        # How the mean force in the start's frame changes with the rotation and with the rate.
+        _turned_force(turned, following[3:], tilt)
+        _product(tilt, turn.T, lever)
+        _turned_force(rotation, reading[3:], before)
+        _product(tilt, jacobian, product)
+        for i in range(3):
+            force[i] = 0.0
+            for j in range(3):
+                lever[i, j] = -0.5 * (lever[i, j] + before[i, j])
+                tilt[i, j] = -0.5 * dt * product[i, j]
+                force[i] += 0.5 * (
+                    rotation[i, j] * reading[3 + j] + turned[i, j] * following[3 + j]
+                )
+
+        _propagate(covariance, turn, lever, dt, rows, lean)
+        _add_noise(covariance, jacobian, tilt, dt, gyro_density**2, accelerometer_density**2)
+        _product(lever, jacobians[0], before)
+        _product(turn.T, jacobians[0], product)
+        for i in range(3):
+            position[i] += dt * (velocity[i] + 0.5 * dt * force[i])
+            velocity[i] += dt * force[i]
+            for j in range(3):
+                by_gyro = before[i, j] - tilt[i, j]
+                by_force = -0.5 * (rotation[i, j] + turned[i, j])
+                jacobians[0, i, j] = product[i, j] - dt * jacobian[i, j]
+                jacobians[3, i, j] += dt * (jacobians[1, i, j] + 0.5 * dt * by_gyro)
+                jacobians[4, i, j] += dt * (jacobians[2, i, j] + 0.5 * dt * by_force)
+                jacobians[1, i, j] += dt * by_gyro
+                jacobians[2, i, j] += dt * by_force
+        rotation, reading, stamp = turned, following, next_stamp
+    return rotation, velocity, position, jacobians, covariance, _gap(stamps, start, end)
+
+
+@njit(cache=True, error_model="numpy")
+def _gap(stamps: NDArray[np.int64], start: int, end: int) -> float:
+    """The longest time between neighbouring samples that any of [start, end] lies in [s]."""
+    first = max(int(np.searchsorted(stamps, start, side="right")) - 1, 0)
+    last = min(int(np.searchsorted(stamps, end, side="left")), len(stamps) - 1)
+    longest = max(stamps[0] - start, end - stamps[-1], 0)
+    for index in range(first, last):
+        longest = max(longest, stamps[index + 1] - stamps[index])
+    return longest * 1e-9
