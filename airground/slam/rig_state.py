@@ -1,4 +1,4 @@
-"""What is estimated of a moving robot, and how it goes on until the next image."""
+"""What is estimated of a moving robot."""
 
 from __future__ import annotations
 
@@ -7,14 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from airground.core.messages import ImuNoise, ImuSamples
 from airground.core.se3 import SE3, nearest_rotation
-from airground.slam.inertial.preintegration import ImuBuffer, Preintegration
-
-MAX_GAP_S = 0.04
-"""Inertial samples farther apart than this have a hole between them: a robot shakes faster."""
-ROTATION_SIGMA = 2e-3
-"""What the gyro leaves open from image to image: clock, mounting and bias [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,79 +40,11 @@ class RigState:
         """The same state at another pose."""
         return replace(self, rotation=T_map_rig.rotation, position=T_map_rig.translation)
 
-
-@dataclass(frozen=True, eq=False)
-class Prediction:
-    """The state at the next image before looking at it.
-
-    Attributes:
-        state: As predicted.
-        rotation_sigma: How well the rotation is known [rad]; None without a gyro.
-        inertial: Whether position and velocity follow the accelerometer, too.
-    """
-
-    state: RigState
-    rotation_sigma: float | None
-    inertial: bool
-
-
-class MotionModel:
-    """Predicts by the IMU where there is one, else by constant velocity.
-
-    Args:
-        imu: Noise of the robot's IMU; None without one.
-        time_offset_ns: Added to the camera's stamps gives the IMU's clock.
-    """
-
-    def __init__(self, imu: ImuNoise | None, time_offset_ns: int) -> None:
-        self.buffer = ImuBuffer(imu) if imu is not None else None
-        self._offset_ns = time_offset_ns
-
-    def add(self, samples: ImuSamples) -> None:
-        if self.buffer is not None:
-            self.buffer.add(samples)
-
-    def preintegrate(self, start_ns: int, end_ns: int, state: RigState) -> Preintegration | None:
-        """Inertial motion between two images; None where samples are missing."""
-        if self.buffer is None:
-            return None
-        start, end = start_ns + self._offset_ns, end_ns + self._offset_ns
-        if not self.buffer.covers(start, end):
-            return None
-        motion = self.buffer.preintegrate(start, end, state.gyro_bias, state.accelerometer_bias)
-        return motion if motion.longest_gap_s <= MAX_GAP_S else None
-
-    def predict(
-        self,
-        state: RigState,
-        turn: NDArray[np.float64],
-        start_ns: int,
-        end_ns: int,
-        metric: bool,
-    ) -> Prediction:
-        """The state at `end_ns`.
-
-        Args:
-            state: At `start_ns`.
-            turn: (3, 3) rotation over the image before, for want of a gyro.
-            start_ns, end_ns: Stamps of two images.
-            metric: Whether the map's unit is the metre and its z axis points up.
-        """
-        seconds = (end_ns - start_ns) * 1e-9
-        motion = self.preintegrate(start_ns, end_ns, state)
-        coasted = replace(state, position=state.position + seconds * state.velocity)
-        if motion is None:
-            return Prediction(replace(coasted, rotation=state.rotation @ turn), None, False)
-        if not metric:
-            rotation, _, _ = motion.corrected(state.gyro_bias, state.accelerometer_bias)
-            rotation = state.rotation @ rotation
-            return Prediction(replace(coasted, rotation=rotation), ROTATION_SIGMA, False)
-        rotation, position, velocity = motion.predict(
-            state.rotation,
-            state.position,
-            state.velocity,
-            state.gyro_bias,
-            state.accelerometer_bias,
+    def moved(self, T_new_map: SE3) -> RigState:
+        """The same state after the map moved."""
+        return replace(
+            self,
+            rotation=nearest_rotation(T_new_map.rotation @ self.rotation),
+            position=T_new_map @ self.position,
+            velocity=T_new_map.rotation @ self.velocity,
         )
-        predicted = replace(state, rotation=rotation, position=position, velocity=velocity)
-        return Prediction(predicted, ROTATION_SIGMA, True)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+
+from airground.slam.rig_state import RigState
 
 FIRST_POINTS = 4096
 CANDIDATE, MAPPED, DROPPED = 0, 1, 2
@@ -19,9 +21,7 @@ class Keyframe:
     Attributes:
         stamp_ns: Of the image.
         image: (height, width) uint8 grey.
-        rotation, position: `T_map_rig`, the rig being the IMU.
-        velocity: (3,) of the rig in the map [m/s].
-        gyro_bias, accelerometer_bias: (3,) [rad/s], [m/s^2].
+        state: Of the rig.
         ids: (n,) int64 points seen, each once.
         pixels: (n, 2) float64 where.
         inverse_depths: (n,) [1/m], measured by a depth camera; NaN where it was not.
@@ -30,11 +30,7 @@ class Keyframe:
 
     stamp_ns: int
     image: NDArray[np.uint8]
-    rotation: NDArray[np.float64]
-    position: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    gyro_bias: NDArray[np.float64]
-    accelerometer_bias: NDArray[np.float64]
+    state: RigState
     ids: NDArray[np.int64]
     pixels: NDArray[np.float64]
     inverse_depths: NDArray[np.float64]
@@ -60,7 +56,8 @@ class SparseMap:
         keyframes: All of them.
         positions: (capacity, 3) of the points in the map [m]; only those MAPPED count.
         states: (capacity,) CANDIDATE, MAPPED or DROPPED.
-        origins: (capacity,) index of the keyframe in which a point was first seen.
+        origins: (capacity,) index of the keyframe in which a point was first seen ...
+        first_pixels: (capacity, 2) ... and where in its image.
     """
 
     def __init__(self) -> None:
@@ -68,20 +65,26 @@ class SparseMap:
         self.positions = np.zeros((FIRST_POINTS, 3))
         self.states = np.zeros(FIRST_POINTS, np.int8)
         self.origins = np.zeros(FIRST_POINTS, np.int64)
+        self.first_pixels = np.zeros((FIRST_POINTS, 2))
         self._count = 0
 
     def __len__(self) -> int:
         """Points that were ever made."""
         return self._count
 
-    def new_points(self, count: int, origin: int) -> NDArray[np.int64]:
-        """Numbers of `count` new candidates, first seen in keyframe `origin`."""
+    def new_points(self, pixels: NDArray, origin: int) -> NDArray[np.int64]:
+        """Numbers of new candidates, first seen at (n, 2) pixels of keyframe `origin`."""
+        count = len(pixels)
         while self._count + count > len(self.states):
             self.positions = np.concatenate([self.positions, np.zeros_like(self.positions)])
             self.states = np.concatenate([self.states, np.zeros_like(self.states)])
             self.origins = np.concatenate([self.origins, np.zeros_like(self.origins)])
+            self.first_pixels = np.concatenate(
+                [self.first_pixels, np.zeros_like(self.first_pixels)]
+            )
         ids = np.arange(self._count, self._count + count)
         self.origins[ids] = origin
+        self.first_pixels[ids] = pixels
         self._count += count
         return ids
 
@@ -114,8 +117,12 @@ class SparseMap:
     def move(self, scale: float, rotation: NDArray, translation: NDArray) -> None:
         """Move the whole map: x -> scale * rotation @ x + translation."""
         for keyframe in self.keyframes:
-            keyframe.rotation = rotation @ keyframe.rotation
-            keyframe.position = scale * rotation @ keyframe.position + translation
-            keyframe.velocity = scale * rotation @ keyframe.velocity
+            state = keyframe.state
+            keyframe.state = replace(
+                state,
+                rotation=rotation @ state.rotation,
+                position=scale * rotation @ state.position + translation,
+                velocity=scale * rotation @ state.velocity,
+            )
         n = self._count
         self.positions[:n] = scale * self.positions[:n] @ rotation.T + translation

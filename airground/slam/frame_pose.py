@@ -1,0 +1,111 @@
+"""The pose of one image from the map points that were followed into it."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.camera import PinholeCamera
+from airground.core.se3 import SE3, nearest_rotation
+from airground.slam.geometry.pose_estimation import PoseFit, estimate_pose
+from airground.slam.geometry.translation_ransac import translation_by_known_rotation
+
+RANSAC_ROUNDS = 50
+RANSAC_THRESHOLD_PX = 3.0
+PNP_ROUNDS = 100
+POSITION_SIGMA_M = 0.02
+"""What inertial prediction leaves open from one image to the next [m]."""
+
+
+def frame_pose(
+    points_map: NDArray[np.float64],
+    pixels: NDArray[np.float64],
+    camera: PinholeCamera,
+    T_map_camera_predicted: SE3,
+    *,
+    sigma_px: float,
+    rotation_sigma: float | None,
+    inertial: bool,
+    min_points: int,
+    rng: np.random.Generator,
+    inverse_depths: NDArray[np.float64] | None = None,
+    inverse_depth_sigma: float = 1.0,
+) -> PoseFit | None:
+    """Reject outliers, by the known rotation where there is a gyro, and fit the rest.
+
+    Args:
+        points_map: (N, 3) map points.
+        pixels: (N, 2) where they are in the image.
+        camera: Of the image.
+        T_map_camera_predicted: Where the camera should be.
+        sigma_px: Noise of a pixel.
+        rotation_sigma: How well the predicted rotation is known [rad]; None if it is not.
+        inertial: Whether the predicted position is good to centimetres.
+        min_points: With fewer inliers there is no pose.
+        rng: Draws the samples.
+        inverse_depths: (N,) measured [1/m], NaN where not; None without a depth camera.
+        inverse_depth_sigma: Their noise [1/m].
+
+    Returns:
+        The fit, its `inliers` over all N; None where the image does not tell the pose.
+    """
+    if len(points_map) < min_points:
+        return None
+    start, chosen = _consensus(
+        points_map, pixels, camera, T_map_camera_predicted, rotation_sigma, rng
+    )
+    if start is None or chosen.sum() < min_points:
+        return None
+    depths = None if inverse_depths is None else inverse_depths[chosen]
+    fit = estimate_pose(
+        points_map[chosen],
+        pixels[chosen],
+        np.full(int(chosen.sum()), sigma_px),
+        camera,
+        start,
+        inverse_depths=depths,
+        inverse_depth_sigmas=None if depths is None else np.full(len(depths), inverse_depth_sigma),
+        rotation_sigma=rotation_sigma,
+        position_sigma=POSITION_SIGMA_M if inertial else None,
+    )
+    if fit.inliers.sum() < min_points or fit.inliers.mean() < 0.5:
+        return None
+    inliers = np.zeros(len(points_map), bool)
+    inliers[np.flatnonzero(chosen)[fit.inliers]] = True
+    return PoseFit(fit.T_map_camera, inliers, fit.rms_px, fit.covariance, fit.iterations)
+
+
+def _consensus(
+    points_map: NDArray[np.float64],
+    pixels: NDArray[np.float64],
+    camera: PinholeCamera,
+    predicted: SE3,
+    rotation_sigma: float | None,
+    rng: np.random.Generator,
+) -> tuple[SE3 | None, NDArray[np.bool_]]:
+    """A pose that many points agree on, and which."""
+    if rotation_sigma is not None:
+        return translation_by_known_rotation(
+            points_map, pixels, camera, predicted.rotation, RANSAC_THRESHOLD_PX, RANSAC_ROUNDS, rng
+        )
+    T_camera_map = predicted.inverse()
+    cv2.setRNGSeed(int(rng.integers(2**31)))
+    found, turn, shift, rows = cv2.solvePnPRansac(
+        points_map,
+        pixels,
+        camera.matrix(),
+        None,
+        rvec=T_camera_map.rotation_vector().reshape(3, 1),
+        tvec=T_camera_map.translation.reshape(3, 1).copy(),
+        useExtrinsicGuess=True,
+        iterationsCount=PNP_ROUNDS,
+        reprojectionError=RANSAC_THRESHOLD_PX,
+        flags=cv2.SOLVEPNP_ITERATIVE,
+    )
+    chosen = np.zeros(len(points_map), bool)
+    if not found or rows is None:
+        return None, chosen
+    chosen[rows.ravel()] = True
+    rotation = nearest_rotation(cv2.Rodrigues(turn)[0])
+    return SE3(rotation, shift.ravel()).inverse(), chosen

@@ -1,0 +1,327 @@
+"""Keyframe-based SLAM of one camera, with depth, an IMU, both or neither (Sec. IV).
+
+Corners are followed from image to image; those that are in the map give the pose; now and
+then an image becomes a keyframe and extends the map. How a map begins is in `starts.py`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.config import KeyframeSlam as Parameters
+from airground.core.messages import ImuSamples, RobotCalibration
+from airground.core.se3 import SE3
+from airground.core.trajectory import Trajectory
+from airground.slam.depth_lookup import inverse_depths_at
+from airground.slam.feature_tracker import FeatureTracker
+from airground.slam.frame_pose import frame_pose
+from airground.slam.geometry.pose_estimation import PoseFit
+from airground.slam.local_mapping import LocalMapper, NewKeyframe
+from airground.slam.map_adjustment import MapAdjuster
+from airground.slam.recovery import Recovery
+from airground.slam.motion_model import MotionModel, Prediction
+from airground.slam.rig_state import RigState
+from airground.slam.sparse_map import SparseMap
+
+PATIENCE = 2
+"""A point that fits the pose badly in this many images in a row is given up."""
+MAX_COAST_S = 3.0
+"""Inertial dead reckoning without a look at the scene drifts by centimetres in this time."""
+FIRST_GLOBAL_ADJUSTMENT = 24
+"""The whole map is adjusted at this many keyframes, and whenever their number doubles."""
+MAX_JUMP_M = 0.25
+"""No robot here moves so far between prediction and measurement from image to image."""
+DEPTH_RANGE_PERCENT = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One image as the engine takes it.
+
+    Attributes:
+        stamp_ns: Of the image.
+        image: (height, width) grey.
+        depth: (height, width) [m], NaN where missing; None without a depth camera.
+    """
+
+    stamp_ns: int
+    image: NDArray[np.uint8]
+    depth: NDArray[np.float32] | None = None
+
+
+class KeyframeSlam:
+    """The machinery that both robots share.
+
+    Args:
+        calibration: Of the robot.
+        parameters: Its section of the configuration.
+        inverse_depth_sigma: Noise of measured inverse depth [1/m].
+        max_depth_m: Depth beyond this starts no point.
+
+    Attributes:
+        map: Keyframes and points.
+        tracker: The corners that are followed.
+        motion: Predicts the next state.
+        state: The newest.
+        stamp_ns: Of the newest state; None before the map began.
+        inertial: Whether the map is metric and gravity-aligned and the velocity known, so
+            that the accelerometer counts.
+        metric: Whether the map's unit is the metre.
+    """
+
+    def __init__(
+        self,
+        calibration: RobotCalibration,
+        parameters: Parameters,
+        inverse_depth_sigma: float = 1.0,
+        max_depth_m: float = np.inf,
+    ) -> None:
+        self.calibration, self.parameters = calibration, parameters
+        self.camera, self.T_rig_camera = calibration.camera, calibration.T_imu_camera
+        self.motion = MotionModel(calibration.imu, calibration.camera_time_offset_ns)
+        self.tracker = FeatureTracker(parameters.patch_px, levels=1)
+        self.metric = self.inertial = False
+        self._inverse_depth_sigma, self._max_depth_m = inverse_depth_sigma, max_depth_m
+        self._rng = np.random.default_rng(0)
+        self._tracked: list[tuple[int, int, SE3]] = []
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the map; images that were tracked in it are given up."""
+        self.map = SparseMap()
+        self.tracker.clear()
+        self.state = RigState.at_origin()
+        self.stamp_ns: int | None = None
+        self._turn = np.eye(3)
+        self._seen_ns = 0
+        self._next_global = FIRST_GLOBAL_ADJUSTMENT
+        self._keyframe_covariance = np.zeros((6, 6))
+        self._tracked.clear()
+        self.adjuster = MapAdjuster(
+            self.map, self.camera, self.T_rig_camera, self.parameters, self._inverse_depth_sigma
+        )
+        self._mapper = LocalMapper(
+            self.map,
+            self.tracker,
+            self.adjuster,
+            self.camera,
+            self.T_rig_camera,
+            self.parameters,
+            self._max_depth_m,
+        )
+        self._recovery = Recovery(self.map, self.camera, self.T_rig_camera, self.parameters)
+
+    def add_imu(self, samples: ImuSamples) -> None:
+        self.motion.add(samples)
+
+    @property
+    def begun(self) -> bool:
+        """Whether there is a map to track in."""
+        return self.stamp_ns is not None
+
+    def begin(self, frame: Frame, state: RigState, still: bool) -> None:
+        """Start the map with this image as its first keyframe."""
+        self.tracker.clear()
+        self.tracker.advance(frame.image, self.tracker.pixels)
+        self.state, self.stamp_ns, self._seen_ns = state, frame.stamp_ns, frame.stamp_ns
+        self._insert(frame, still=still)
+
+    def track(self, frame: Frame) -> tuple[PoseFit | None, bool]:
+        """Follow the map into the next image.
+
+        Returns:
+            The fit of the newest pose, None where the image did not give one; and whether
+            the map was adjusted as a whole.
+        """
+        assert self.stamp_ns is not None
+        prediction = self.motion.predict(
+            self.state, self._turn, self.stamp_ns, frame.stamp_ns, self.inertial
+        )
+        lost = self._seen_ns != self.stamp_ns
+        self.tracker.advance(frame.image, self._expected(prediction), 2 if lost else 0)
+        fit = self._fit(frame, prediction)
+        if fit is None:
+            fit = self._recover(frame, prediction)
+        self._move_on(frame, prediction, fit)
+        if fit is None and not (prediction.inertial and not self._tracked):
+            return None, False
+        if self._wants_keyframe(frame.stamp_ns):
+            return fit, self._insert(frame)
+        return fit, False
+
+    def note(self, stamp_ns: int) -> None:
+        """Remember the newest pose as one of the trajectory."""
+        index = len(self.map.keyframes) - 1
+        T_keyframe_map = self.map.keyframes[index].state.pose().inverse()
+        self._tracked.append((stamp_ns, index, T_keyframe_map @ self.T_map_camera()))
+
+    def T_map_camera(self) -> SE3:
+        """The newest pose of the camera."""
+        return self.state.pose() @ self.T_rig_camera
+
+    def trajectory(self) -> Trajectory | None:
+        """Every image noted, hung on its keyframe where that is now."""
+        if not self._tracked:
+            return None
+        keyframes = [keyframe.state.pose() for keyframe in self.map.keyframes]
+        poses = [keyframes[k] @ T for _, k, T in self._tracked]
+        return Trajectory.from_poses([stamp for stamp, _, _ in self._tracked], poses)
+
+    def adjust_all(self) -> None:
+        """Adjust the whole map and go on from its newest keyframe."""
+        newest = self.map.keyframes[-1]
+        T_before_map = newest.state.pose().inverse()
+        self.adjuster.adjust_all(self.inertial)
+        self.state = replace(
+            self.state.moved(newest.state.pose() @ T_before_map),
+            gyro_bias=newest.state.gyro_bias,
+            accelerometer_bias=newest.state.accelerometer_bias,
+        )
+
+    def covariance(self, fit: PoseFit) -> NDArray[np.float64]:
+        """(6, 6) of the newest pose: that of the image within the map, and of the map."""
+        return fit.covariance + self._keyframe_covariance
+
+    def depth_range(self) -> tuple[float, float] | None:
+        """Nearest and farthest map point in the newest image [m]."""
+        ids = self.tracker.ids[self.map.mapped(self.tracker.ids)]
+        if len(ids) < self.parameters.min_points:
+            return None
+        z = (self.T_map_camera().inverse() @ self.map.positions[ids])[:, 2]
+        low, high = np.percentile(z, [DEPTH_RANGE_PERCENT, 100 - DEPTH_RANGE_PERCENT])
+        return (float(low), float(high)) if low > 0 else None
+
+    def _expected(self, prediction: Prediction) -> NDArray[np.float64]:
+        """(N, 2) where the corners should be: map points by their place, others by a guess."""
+        if len(self.tracker.ids) == 0:
+            return self.tracker.pixels
+        here, there = self.T_map_camera(), prediction.state.pose() @ self.T_rig_camera
+        mapped = self.map.mapped(self.tracker.ids)
+        T_camera_map = here.inverse()
+        z = (T_camera_map @ self.map.positions[self.tracker.ids])[:, 2]
+        known = mapped & (z > 0)
+        z = np.where(known, z, np.median(z[known]) if known.any() else 1.0)
+        homogeneous = np.column_stack([self.tracker.pixels, np.ones(len(z))])
+        points = homogeneous @ np.linalg.inv(self.camera.matrix()).T * z[:, None]
+        if not known.any():  # no depth to go by: only the turn counts
+            there = SE3(there.rotation, here.translation)
+        expected = self.camera.project(there.inverse() @ (here @ points))
+        return np.where(np.isfinite(expected), expected, self.tracker.pixels)
+
+    def _fit(self, frame: Frame, prediction: Prediction) -> PoseFit | None:
+        """The pose by the map points that were followed into this image."""
+        rows = np.flatnonzero(self.map.mapped(self.tracker.ids))
+        ids = self.tracker.ids[rows]
+        pixels = self.tracker.pixels[rows].astype(np.float64)
+        depths = None
+        if frame.depth is not None:
+            depths = inverse_depths_at(frame.depth, pixels, self._max_depth_m)
+        fit = frame_pose(
+            self.map.positions[ids],
+            pixels,
+            self.camera,
+            prediction.state.pose() @ self.T_rig_camera,
+            sigma_px=self.parameters.corner_sigma_px,
+            rotation_sigma=prediction.rotation_sigma,
+            inertial=prediction.inertial,
+            min_points=self.parameters.min_points,
+            rng=self._rng,
+            inverse_depths=depths,
+            inverse_depth_sigma=self._inverse_depth_sigma,
+        )
+        if fit is None or self._jumps(fit, prediction):
+            return None
+        self.tracker.judge(ids, fit.inliers, PATIENCE)
+        return fit
+
+    def _jumps(self, fit: PoseFit, prediction: Prediction) -> bool:
+        """Whether a pose is too far from where inertia would have carried the robot."""
+        if not self.metric:
+            return False
+        expected = prediction.state.pose() @ self.T_rig_camera
+        off = fit.T_map_camera.translation - expected.translation
+        return float(np.linalg.norm(off)) > MAX_JUMP_M
+
+    def _recover(self, frame: Frame, prediction: Prediction) -> PoseFit | None:
+        """Look for the map where it should be, then anywhere."""
+        if not self._tracked:
+            return None
+        found = self._recovery.near(frame.image, prediction) or self._recovery.anywhere(frame.image)
+        if found is None:
+            return None
+        self.tracker.clear()
+        self.tracker.advance(frame.image, self.tracker.pixels)
+        self.tracker.add(found.ids, found.pixels)
+        return found.fit
+
+    def _move_on(self, frame: Frame, prediction: Prediction, fit: PoseFit | None) -> None:
+        """The state at this image: as measured, or else as predicted."""
+        assert self.stamp_ns is not None
+        before, seconds = self.state, (frame.stamp_ns - self.stamp_ns) * 1e-9
+        state = prediction.state
+        coasted_s = (frame.stamp_ns - self._seen_ns) * 1e-9
+        if fit is not None:
+            state = state.posed(fit.T_map_camera @ self.T_rig_camera.inverse())
+            if not prediction.inertial:
+                step = state.position - before.position
+                followed = self._seen_ns == self.stamp_ns
+                state = replace(state, velocity=step / seconds if followed else np.zeros(3))
+            self._seen_ns = frame.stamp_ns
+        elif not prediction.inertial or coasted_s > MAX_COAST_S:
+            state = replace(before, velocity=np.zeros(3))
+        self._turn = before.rotation.T @ state.rotation
+        self.state, self.stamp_ns = state, frame.stamp_ns
+
+    def _wants_keyframe(self, stamp_ns: int) -> bool:
+        """Whether this image shows enough that the last keyframe did not."""
+        last, parameters = self.map.keyframes[-1], self.parameters
+        order = np.argsort(last.ids)
+        place = np.searchsorted(last.ids, self.tracker.ids, sorter=order).clip(
+            0, len(last.ids) - 1
+        )
+        rows = order[place] if len(order) else np.empty(0, np.int64)
+        common = last.ids[rows] == self.tracker.ids if len(order) else np.zeros(0, bool)
+        if common.sum() < parameters.keyframe_share * len(last.ids):
+            return True
+        if self.motion.buffer is not None and self.metric:
+            seconds = (stamp_ns - last.stamp_ns) * 1e-9
+            if seconds >= parameters.keyframe_interval_s:
+                return True
+        moved = self._unturned(self.tracker.pixels[common], last.state.rotation) - last.pixels[rows[common]]
+        parallax = np.linalg.norm(moved, axis=1)
+        return bool(len(parallax)) and float(np.median(parallax)) > parameters.keyframe_parallax_px
+
+    def _unturned(self, pixels: NDArray, rotation: NDArray) -> NDArray[np.float64]:
+        """(N, 2) pixels as the camera would see them, had it not turned since a keyframe."""
+        R_keyframe_here = self.T_rig_camera.rotation.T @ (
+            rotation.T @ self.state.rotation @ self.T_rig_camera.rotation
+        )
+        matrix = self.camera.matrix()
+        rays = np.column_stack([pixels, np.ones(len(pixels))]) @ np.linalg.inv(matrix).T
+        turned = rays @ R_keyframe_here.T @ matrix.T
+        return turned[:, :2] / turned[:, 2:]
+
+    def _insert(self, frame: Frame, still: bool = False) -> bool:
+        """Make the newest image a keyframe; returns whether the whole map was adjusted."""
+        motion = None
+        if self.map.keyframes:
+            motion = self.motion.preintegrate(
+                self.map.keyframes[-1].stamp_ns, frame.stamp_ns, self.state
+            )
+        new = NewKeyframe(frame.stamp_ns, frame.image, frame.depth, self.state, motion, still)
+        covariance = self._mapper.insert(new, self.inertial)
+        if covariance is not None:
+            self._keyframe_covariance = covariance
+        adjusted = self.map.keyframes[-1].state
+        if not self.inertial:
+            adjusted = replace(adjusted, velocity=self.state.velocity)
+        self.state = adjusted
+        self._recovery.add_keyframe()
+        if len(self.map.keyframes) < self._next_global:
+            return False
+        self._next_global *= 2
+        self.adjust_all()
+        return True

@@ -1,0 +1,226 @@
+"""What a new keyframe adds to the map: points, old points seen again, better poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.config import KeyframeSlam
+from airground.core.camera import PinholeCamera
+from airground.core.se3 import SE3
+from airground.slam.corners import detect_corners
+from airground.slam.depth_lookup import inverse_depths_at
+from airground.slam.feature_tracker import FeatureTracker
+from airground.slam.geometry.pose_estimation import estimate_pose
+from airground.slam.geometry.triangulation import triangulate_pairs
+from airground.slam.inertial.preintegration import Preintegration
+from airground.slam.map_adjustment import MapAdjuster
+from airground.slam.reacquisition import find_again, keyframes_in_view, visible
+from airground.slam.rig_state import RigState
+from airground.slam.sparse_map import CANDIDATE, Keyframe, SparseMap
+
+MAX_TRIANGULATION_ERROR_PX = 2.0
+MIN_REUSED = 12
+"""Fewer old points than this found again could be chance."""
+REUSE_SEARCH_PX = 15.0
+"""An old point farther than this from where it was expected is another."""
+
+
+@dataclass(frozen=True, eq=False)
+class NewKeyframe:
+    """What the engine knows of an image that becomes a keyframe.
+
+    Attributes:
+        stamp_ns: Of the image.
+        image: (height, width) grey.
+        depth: (height, width) [m]; None without a depth camera.
+        state: Of the rig, as tracked.
+        motion: Inertial motion since the last keyframe, where known.
+        still: Whether the robot is at rest.
+    """
+
+    stamp_ns: int
+    image: NDArray[np.uint8]
+    depth: NDArray[np.float32] | None
+    state: RigState
+    motion: Preintegration | None
+    still: bool = False
+
+
+class LocalMapper:
+    """Extends the map by one keyframe at a time.
+
+    Args:
+        sparse_map, tracker: Changed in place.
+        adjuster: Of the same map.
+        camera, T_rig_camera: The robot's camera.
+        parameters: The robot's section of the configuration.
+        max_depth_m: Depth beyond this starts no point.
+    """
+
+    def __init__(
+        self,
+        sparse_map: SparseMap,
+        tracker: FeatureTracker,
+        adjuster: MapAdjuster,
+        camera: PinholeCamera,
+        T_rig_camera: SE3,
+        parameters: KeyframeSlam,
+        max_depth_m: float = np.inf,
+    ) -> None:
+        self._map = sparse_map
+        self._tracker = tracker
+        self._adjuster = adjuster
+        self._camera = camera
+        self._T_rig_camera = T_rig_camera
+        self._parameters = parameters
+        self._max_depth_m = max_depth_m
+
+    def insert(self, new: NewKeyframe, inertial: bool) -> NDArray[np.float64] | None:
+        """Add a keyframe; returns the covariance of its pose where it is known.
+
+        Args:
+            new: The keyframe; the tracker stands at its image.
+            inertial: Whether the map is metric and gravity-aligned.
+        """
+        keyframe = self._append(new)
+        index = len(self._map.keyframes) - 1
+        if new.motion is not None:
+            self._adjuster.motions[index] = new.motion
+        self._triangulate(keyframe)
+        self._reuse(keyframe, new)
+        covariance = self._adjuster.adjust_window(inertial)
+        self._tracker.keep(~self._dropped(self._tracker.ids))
+        self._detect(keyframe, index, new)
+        return covariance
+
+    def _append(self, new: NewKeyframe) -> Keyframe:
+        pixels = self._tracker.pixels.astype(np.float64)
+        keyframe = Keyframe(
+            new.stamp_ns,
+            new.image,
+            new.state,
+            self._tracker.ids.copy(),
+            pixels,
+            self._inverse_depths(new, pixels),
+            new.still,
+        )
+        self._map.keyframes.append(keyframe)
+        return keyframe
+
+    def _inverse_depths(self, new: NewKeyframe, pixels: NDArray) -> NDArray[np.float64]:
+        if new.depth is None:
+            return np.full(len(pixels), np.nan)
+        return inverse_depths_at(new.depth, pixels, self._max_depth_m)
+
+    def _dropped(self, ids: NDArray[np.int64]) -> NDArray[np.bool_]:
+        states = self._map.states[ids]
+        return (states != CANDIDATE) & ~self._map.mapped(ids)
+
+    def _triangulate(self, keyframe: Keyframe) -> None:
+        """Place candidates whose rays from first sight and from here cross well."""
+        rows = np.flatnonzero(self._map.states[keyframe.ids] == CANDIDATE)
+        if len(rows) == 0:
+            return
+        ids = keyframe.ids[rows]
+        origins = [self._map.keyframes[k] for k in self._map.origins[ids]]
+        points = triangulate_pairs(
+            self._cameras(origins),
+            self._map.first_pixels[ids],
+            self._cameras([keyframe] * len(ids)),
+            keyframe.pixels[rows],
+            self._camera,
+        )
+        good = points.good & (points.parallax_rad > np.deg2rad(self._parameters.min_parallax_deg))
+        good &= points.reprojection_px < MAX_TRIANGULATION_ERROR_PX
+        self._map.place(ids[good], points.points[good])
+
+    def _cameras(self, keyframes: list[Keyframe]) -> tuple[NDArray, NDArray]:
+        """(n, 3, 3) and (n, 3) `T_map_camera` of keyframes."""
+        T = self._T_rig_camera
+        rotations = np.array([k.state.rotation for k in keyframes])
+        positions = np.array([k.state.position for k in keyframes])
+        return rotations @ T.rotation, rotations @ T.translation + positions
+
+    def _reuse(self, keyframe: Keyframe, new: NewKeyframe) -> None:
+        """Look for points of old keyframes: this is what closes loops before they open."""
+        old = len(self._map.keyframes) - 1 - self._parameters.window
+        if old <= 0 or self._parameters.reused_keyframes == 0:
+            return
+        T_map_camera = new.state.pose() @ self._T_rig_camera
+        ids = np.setdiff1d(self._map.seen_by(list(range(old))), self._tracker.ids)
+        expected, inside = visible(self._map.positions[ids], T_map_camera, self._camera)
+        ids, expected = ids[inside], expected[inside]
+        chosen = keyframes_in_view(
+            self._map,
+            range(old),
+            T_map_camera,
+            self._T_rig_camera,
+            ids,
+            self._parameters.reused_keyframes,
+            MIN_REUSED,
+        )
+        found_ids: list[NDArray] = []
+        found_px: list[NDArray] = []
+        for k in chosen:
+            rows = np.isin(ids, self._map.keyframes[k].ids)
+            again, pixels = find_again(
+                self._map,
+                k,
+                ids[rows],
+                new.image,
+                expected[rows],
+                self._parameters.patch_px,
+                1,
+            )
+            near = np.linalg.norm(pixels - expected[np.searchsorted(ids, again)], axis=1)
+            again, pixels = again[near < REUSE_SEARCH_PX], pixels[near < REUSE_SEARCH_PX]
+            found_ids.append(again)
+            found_px.append(pixels)
+            left = ~np.isin(ids, again)
+            ids, expected = ids[left], expected[left]
+        if found_ids:
+            self._take_back(keyframe, new, np.concatenate(found_ids), np.concatenate(found_px))
+
+    def _take_back(
+        self, keyframe: Keyframe, new: NewKeyframe, ids: NDArray, pixels: NDArray
+    ) -> None:
+        """Follow old points again if they agree with each other on where the camera is."""
+        if len(ids) < MIN_REUSED:
+            return
+        fit = estimate_pose(
+            self._map.positions[ids],
+            pixels.astype(np.float64),
+            np.full(len(ids), self._parameters.corner_sigma_px),
+            self._camera,
+            new.state.pose() @ self._T_rig_camera,
+            rotation_sigma=0.01,
+            position_sigma=0.1,
+        )
+        good = fit.inliers
+        if good.sum() < MIN_REUSED or good.mean() < 0.5:
+            return
+        self._tracker.add(ids[good], pixels[good])
+        pixels_kept = pixels[good].astype(np.float64)
+        keyframe.see(ids[good], pixels_kept, self._inverse_depths(new, pixels_kept))
+
+    def _detect(self, keyframe: Keyframe, index: int, new: NewKeyframe) -> None:
+        """Follow new corners where there are none; with depth they are in the map at once."""
+        wanted = self._parameters.corners - len(self._tracker.ids)
+        corners = detect_corners(
+            new.image, self._tracker.pixels, wanted, self._parameters.corner_spacing_px
+        )
+        pixels = corners.astype(np.float64)
+        ids = self._map.new_points(pixels, index)
+        inverse_depths = self._inverse_depths(new, pixels)
+        keyframe.see(ids, pixels, inverse_depths)
+        self._tracker.add(ids, corners)
+        known = np.isfinite(inverse_depths)
+        if known.any():
+            rays = np.column_stack([pixels[known], np.ones(known.sum())])
+            rays = rays @ np.linalg.inv(self._camera.matrix()).T
+            points_camera = rays / inverse_depths[known, None]
+            T_map_camera = keyframe.state.pose() @ self._T_rig_camera
+            self._map.place(ids[known], T_map_camera @ points_camera)

@@ -1,0 +1,179 @@
+"""Which part of the sparse map bundle adjustment moves, and what becomes of its result."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.config import KeyframeSlam
+from airground.core.camera import PinholeCamera
+from airground.core.se3 import SE3
+from airground.slam.bundle_adjustment import (
+    Adjustment,
+    InertialFactor,
+    Observations,
+    Role,
+    Settings,
+    States,
+    adjust,
+)
+from airground.slam.inertial.preintegration import Preintegration
+from airground.slam.rig_state import RigState
+from airground.slam.sparse_map import SparseMap
+
+MAX_RESIDUAL_SIGMAS = 3.5
+"""An observation farther off than this was of something else."""
+GLOBAL_ITERATIONS = 10
+
+
+class MapAdjuster:
+    """Bundle adjustment over a sparse map.
+
+    Args:
+        sparse_map: Changed in place.
+        camera: Of all keyframes.
+        T_rig_camera: The camera in the rig.
+        parameters: Size of the window, noise of a corner.
+        inverse_depth_sigma: Noise of measured inverse depth [1/m].
+
+    Attributes:
+        motions: By keyframe, the inertial motion since the one before, where known.
+    """
+
+    def __init__(
+        self,
+        sparse_map: SparseMap,
+        camera: PinholeCamera,
+        T_rig_camera: SE3,
+        parameters: KeyframeSlam,
+        inverse_depth_sigma: float,
+    ) -> None:
+        self.motions: dict[int, Preintegration] = {}
+        self._map = sparse_map
+        self._camera = camera
+        self._T_rig_camera = T_rig_camera
+        self._parameters = parameters
+        self._inverse_depth_sigma = inverse_depth_sigma
+
+    def adjust_window(self, inertial: bool) -> NDArray[np.float64] | None:
+        """Move the newest keyframes and their points; older ones that saw them hold still.
+
+        Args:
+            inertial: Whether the map is metric and gravity-aligned, so that the IMU counts.
+
+        Returns:
+            (6, 6) covariance of the newest keyframe's pose, where there is one.
+        """
+        count = len(self._map.keyframes)
+        first_free = max(1, count - self._parameters.window)
+        free = list(range(first_free, count))
+        if not free:
+            return None
+        fixed = self._holding(free)
+        roles = np.array([Role.FIXED] * len(fixed) + [Role.FREE] * len(free))
+        settings = Settings(iterations=self._parameters.iterations)
+        return self._adjust(fixed + free, roles, inertial, settings)
+
+    def adjust_all(self, inertial: bool) -> NDArray[np.float64] | None:
+        """Move the whole map; place and heading of the first keyframe stay."""
+        count = len(self._map.keyframes)
+        roles = np.full(count, Role.FREE)
+        roles[0] = Role.GAUGE if inertial else Role.FIXED
+        settings = Settings(iterations=GLOBAL_ITERATIONS)
+        return self._adjust(list(range(count)), roles, inertial, settings)
+
+    def _holding(self, free: list[int]) -> list[int]:
+        """Older keyframes that share the most points with the free ones, in order of time.
+
+        The one just before the window is always among them: inertial motion starts there.
+        """
+        shared = self._map.shared(self._map.seen_by(free))[: free[0]]
+        shared[-1] = np.iinfo(shared.dtype).max
+        best = np.argsort(-shared, kind="stable")[: self._parameters.fixed_keyframes]
+        return sorted(int(k) for k in best if shared[k] > 0)
+
+    def _adjust(
+        self, chosen: list[int], roles: NDArray, inertial: bool, settings: Settings
+    ) -> NDArray[np.float64] | None:
+        moving = [k for k, role in zip(chosen, roles, strict=True) if role != Role.FIXED]
+        points = self._map.seen_by(moving)
+        observations, rows = self._observations(chosen, points)
+        place = {k: n for n, k in enumerate(chosen)}
+        factors = [
+            InertialFactor(place[k - 1], place[k], self.motions[k])
+            for k in chosen
+            if inertial and k in self.motions and k - 1 in place
+        ]
+        result = adjust(
+            self._states(chosen),
+            roles,
+            self._map.positions[points],
+            observations,
+            factors,
+            self._camera,
+            self._T_rig_camera,
+            settings,
+        )
+        self._apply(chosen, points, rows, result)
+        return result.covariance
+
+    def _states(self, chosen: list[int]) -> States:
+        states = [self._map.keyframes[k].state for k in chosen]
+        return States(
+            rotations=np.array([s.rotation for s in states]),
+            positions=np.array([s.position for s in states]),
+            velocities=np.array([s.velocity for s in states]),
+            gyro_biases=np.array([s.gyro_bias for s in states]),
+            accelerometer_biases=np.array([s.accelerometer_bias for s in states]),
+            still=np.array([self._map.keyframes[k].still for k in chosen]),
+        )
+
+    def _observations(
+        self, chosen: list[int], points: NDArray[np.int64]
+    ) -> tuple[Observations, list[NDArray[np.int64]]]:
+        """All sightings of the points, and which rows of each keyframe they are."""
+        row_of = np.full(len(self._map), -1)
+        row_of[points] = np.arange(len(points))
+        keyframes = [self._map.keyframes[k] for k in chosen]
+        rows = [np.flatnonzero(row_of[keyframe.ids] >= 0) for keyframe in keyframes]
+        pairs = list(zip(keyframes, rows, strict=True))
+        inverse_depths = np.concatenate([k.inverse_depths[r] for k, r in pairs])
+        return Observations(
+            keyframes=np.repeat(np.arange(len(chosen)), [len(r) for r in rows]),
+            points=np.concatenate([row_of[k.ids[r]] for k, r in pairs]),
+            pixels=np.concatenate([k.pixels[r] for k, r in pairs]),
+            sigmas_px=np.full(len(inverse_depths), self._parameters.corner_sigma_px),
+            inverse_depths=inverse_depths,
+            inverse_depth_sigmas=np.full(len(inverse_depths), self._inverse_depth_sigma),
+        ), rows
+
+    def _apply(
+        self,
+        chosen: list[int],
+        points: NDArray[np.int64],
+        rows: list[NDArray[np.int64]],
+        result: Adjustment,
+    ) -> None:
+        """Take over the result and drop the observations that do not fit it."""
+        states = result.states
+        for n, k in enumerate(chosen):
+            self._map.keyframes[k].state = RigState(
+                states.rotations[n],
+                states.positions[n],
+                states.velocities[n],
+                states.gyro_biases[n],
+                states.accelerometer_biases[n],
+            )
+        self._map.positions[points] = result.points
+        limit = MAX_RESIDUAL_SIGMAS * self._parameters.corner_sigma_px
+        # Written so that NaN, a point behind the camera, counts as wrong.
+        wrong = ~(result.residuals_px < limit)
+        left = np.zeros(len(self._map), np.int64)
+        bounds = np.cumsum([0] + [len(r) for r in rows])
+        for n, k in enumerate(chosen):
+            keyframe = self._map.keyframes[k]
+            bad = np.zeros(len(keyframe.ids), bool)
+            bad[rows[n]] = wrong[bounds[n] : bounds[n + 1]]
+            keyframe.forget(bad)
+            left[keyframe.ids] += 1
+        self._map.drop(points[left[points] < 2])

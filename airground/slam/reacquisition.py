@@ -1,0 +1,101 @@
+"""Finding points of the map again that are not followed any more."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.camera import PinholeCamera
+from airground.core.se3 import SE3
+from airground.slam.optical_flow import flow_both_ways
+from airground.slam.sparse_map import SparseMap
+
+MAX_TURN_DEG = 20.0
+MAX_ZOOM = 1.35
+"""Seen from farther apart than this, a patch looks like another."""
+MAX_RETURN_PX = 0.7
+BORDER_PX = 10
+
+
+def visible(
+    points_map: NDArray[np.float64], T_map_camera: SE3, camera: PinholeCamera
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """(N, 2) pixels of points and (N,) whether they lie well inside the image."""
+    pixels = camera.project(T_map_camera.inverse() @ points_map)
+    with np.errstate(invalid="ignore"):
+        inside = (pixels >= BORDER_PX).all(axis=1)
+        inside &= (pixels[:, 0] < camera.width - BORDER_PX) & (
+            pixels[:, 1] < camera.height - BORDER_PX
+        )
+    return pixels, inside
+
+
+def keyframes_in_view(
+    sparse_map: SparseMap,
+    candidates: range,
+    T_map_camera: SE3,
+    T_rig_camera: SE3,
+    points_in_view: NDArray[np.int64],
+    count: int,
+    least: int,
+) -> list[int]:
+    """The keyframes with a similar view that saw most of the points.
+
+    Args:
+        sparse_map: With keyframes and points.
+        candidates: Keyframes to choose from.
+        T_map_camera: The view.
+        T_rig_camera: The camera in the rig.
+        points_in_view: Numbers of the points that the view should see.
+        count: At most this many.
+        least: Each must have seen at least this many of the points.
+    """
+    shared = sparse_map.shared(points_in_view)[: candidates.stop]
+    axis = T_map_camera.rotation[:, 2]
+    chosen: list[int] = []
+    for k in np.argsort(-shared, kind="stable"):
+        if shared[k] < least or len(chosen) == count:
+            break
+        keyframe = sparse_map.keyframes[k]
+        R_map_camera = keyframe.state.rotation @ T_rig_camera.rotation
+        turn = SE3(T_map_camera.rotation.T @ R_map_camera, np.zeros(3)).angle()
+        ids = keyframe.ids[sparse_map.mapped(keyframe.ids)]
+        centre = sparse_map.positions[ids].mean(axis=0)
+        here = float(axis @ (centre - T_map_camera.translation))
+        there = float(R_map_camera[:, 2] @ (centre - keyframe.state.position))
+        zoom = max(here, there) / max(min(here, there), 1e-6)
+        if np.rad2deg(turn) < MAX_TURN_DEG and zoom < MAX_ZOOM:
+            chosen.append(int(k))
+    return chosen
+
+
+def find_again(
+    sparse_map: SparseMap,
+    keyframe: int,
+    ids: NDArray[np.int64],
+    image: NDArray[np.uint8],
+    start: NDArray[np.float64],
+    window_px: int,
+    levels: int,
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """Follow points from an old keyframe into an image.
+
+    Args:
+        sparse_map: With the keyframe.
+        keyframe: Which one.
+        ids: (n,) points it saw, sorted.
+        image: (height, width) grey.
+        start: (n, 2) where the points are expected in `image`.
+        window_px, levels: As in `optical_flow.flow`.
+
+    Returns:
+        Numbers of the points that were found, and (m, 2) pixels in `image`.
+    """
+    old = sparse_map.keyframes[keyframe]
+    order = np.argsort(old.ids)
+    rows = order[np.searchsorted(old.ids, ids, sorter=order)]
+    pixels = old.pixels[rows].astype(np.float32)
+    found_px, found = flow_both_ways(
+        old.image, image, pixels, start.astype(np.float32), window_px, levels, MAX_RETURN_PX
+    )
+    return ids[found], found_px[found]

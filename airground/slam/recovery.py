@@ -1,0 +1,118 @@
+"""Getting back into the map after tracking was lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.config import KeyframeSlam
+from airground.core.camera import PinholeCamera
+from airground.core.se3 import SE3
+from airground.slam.geometry.pose_estimation import PoseFit, estimate_pose
+from airground.slam.geometry.relocalization import KeyframeIndex
+from airground.slam.motion_model import Prediction
+from airground.slam.reacquisition import find_again, keyframes_in_view, visible
+from airground.slam.sparse_map import SparseMap
+
+MIN_FOUND = 20
+"""Map points that must agree before a robot believes to be back."""
+LEVELS = 3
+KEYFRAMES = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The map, found again.
+
+    Attributes:
+        ids: (n,) points seen.
+        pixels: (n, 2) where.
+        fit: The camera's pose by them.
+    """
+
+    ids: NDArray[np.int64]
+    pixels: NDArray[np.float64]
+    fit: PoseFit
+
+
+class Recovery:
+    """Finds the pose of an image without that of the image before.
+
+    Args:
+        sparse_map: Where to look.
+        camera, T_rig_camera: The robot's camera.
+        parameters: Noise and patches.
+    """
+
+    def __init__(
+        self,
+        sparse_map: SparseMap,
+        camera: PinholeCamera,
+        T_rig_camera: SE3,
+        parameters: KeyframeSlam,
+    ) -> None:
+        self._map = sparse_map
+        self._camera = camera
+        self._T_rig_camera = T_rig_camera
+        self._parameters = parameters
+        self._index = KeyframeIndex()
+
+    def add_keyframe(self) -> None:
+        """Make the newest keyframe known."""
+        number = len(self._map.keyframes) - 1
+        keyframe = self._map.keyframes[number]
+        self._index.add(number, keyframe.image, keyframe.ids, keyframe.pixels)
+
+    def near(self, image: NDArray[np.uint8], prediction: Prediction) -> Found | None:
+        """Look where the map should be by the prediction."""
+        T_map_camera = prediction.state.pose() @ self._T_rig_camera
+        count = len(self._map.keyframes)
+        ids = self._map.seen_by(list(range(count)))
+        expected, inside = visible(self._map.positions[ids], T_map_camera, self._camera)
+        ids, expected = ids[inside], expected[inside]
+        chosen = keyframes_in_view(
+            self._map, range(count), T_map_camera, self._T_rig_camera, ids, KEYFRAMES, MIN_FOUND
+        )
+        found_ids: list[NDArray[np.int64]] = []
+        found_px: list[NDArray[np.float32]] = []
+        for k in chosen:
+            rows = np.isin(ids, self._map.keyframes[k].ids)
+            again, pixels = find_again(
+                self._map, k, ids[rows], image, expected[rows], self._parameters.patch_px, LEVELS
+            )
+            found_ids.append(again)
+            found_px.append(pixels)
+            left = ~np.isin(ids, again)
+            ids, expected = ids[left], expected[left]
+        if sum(map(len, found_ids)) < MIN_FOUND:
+            return None
+        return self._agreed(np.concatenate(found_ids), np.concatenate(found_px), T_map_camera)
+
+    def anywhere(self, image: NDArray[np.uint8]) -> Found | None:
+        """Compare the image with all keyframes."""
+        found = self._index.find(image, self._camera, lambda ids: self._map.positions[ids])
+        if found is None:
+            return None
+        return self._agreed(found.ids, found.pixels, found.T_map_camera)
+
+    def _agreed(self, ids: NDArray, pixels: NDArray, T_map_camera: SE3) -> Found | None:
+        """The pose by points that were found, if they agree."""
+        placed = self._map.mapped(ids)
+        ids, pixels = ids[placed], pixels[placed].astype(np.float64)
+        if len(ids) < MIN_FOUND:
+            return None
+        fit = estimate_pose(
+            self._map.positions[ids],
+            pixels,
+            np.full(len(ids), self._parameters.corner_sigma_px),
+            self._camera,
+            T_map_camera,
+            rotation_sigma=None,
+            position_sigma=None,
+        )
+        good = fit.inliers
+        if good.sum() < MIN_FOUND or good.mean() < 0.5:
+            return None
+        return Found(ids[good], pixels[good], fit)

@@ -1,0 +1,77 @@
+"""RGB-D SLAM of the ground robot (Sec. IV): the monocular machinery with measured depth."""
+
+from __future__ import annotations
+
+import cv2
+
+from airground.config import Config
+from airground.core.messages import GroundImage, ImuSamples, RobotCalibration
+from airground.core.trajectory import Trajectory
+from airground.slam.front_end import TrackedPose, Tracking
+from airground.slam.keyframe_slam import Frame, KeyframeSlam
+from airground.slam.starts import level_start
+
+MIN_FIRST_POINTS = 40
+"""A map begins with an image that shows at least this many corners with depth."""
+
+
+class RgbdSlam:
+    """A front end of the ground robot.
+
+    Depth puts corners into the map at once, so tracking begins with the first image that
+    shows something, also while the camera only turns.
+
+    Args:
+        calibration: What is known about the robot's sensors.
+        config: The whole pipeline's; the section `rgbd_slam` is used.
+    """
+
+    def __init__(self, calibration: RobotCalibration, config: Config) -> None:
+        parameters = config.rgbd_slam
+        self._slam = KeyframeSlam(
+            calibration, parameters, parameters.depth_noise_per_m, parameters.max_depth_m
+        )
+        self._slam.metric = True
+
+    def add_imu(self, samples: ImuSamples) -> None:
+        """Take the inertial measurements up to the next image."""
+        self._slam.add_imu(samples)
+
+    def track(self, image: GroundImage) -> TrackedPose:
+        """Where the camera was when `image` was taken."""
+        grey = cv2.cvtColor(image.colour, cv2.COLOR_RGB2GRAY)
+        frame = Frame(image.stamp_ns, grey, image.depth)
+        slam = self._slam
+        if not slam.begun:
+            return self._begin(frame)
+        fit, corrected = slam.track(frame)
+        if fit is None:
+            return TrackedPose(image.stamp_ns, Tracking.LOST, None)
+        slam.note(image.stamp_ns)
+        return TrackedPose(
+            image.stamp_ns,
+            Tracking.TRACKED,
+            slam.T_map_camera(),
+            covariance=slam.covariance(fit),
+            depth_range=slam.depth_range(),
+            corrected=corrected,
+        )
+
+    def finish(self) -> None:
+        """Adjust the whole map."""
+        if self._slam.begun:
+            self._slam.adjust_all()
+
+    def trajectory(self) -> Trajectory | None:
+        """Every image tracked so far, at the pose that is believed now."""
+        return self._slam.trajectory()
+
+    def _begin(self, frame: Frame) -> TrackedPose:
+        slam = self._slam
+        state, at_rest = level_start(slam.motion, slam.calibration, frame.stamp_ns)
+        slam.begin(frame, state, still=at_rest)
+        if slam.map.mapped(slam.tracker.ids).sum() < MIN_FIRST_POINTS:
+            slam.reset()
+            return TrackedPose(frame.stamp_ns, Tracking.INITIALIZING, None)
+        slam.note(frame.stamp_ns)
+        return TrackedPose(frame.stamp_ns, Tracking.TRACKED, slam.T_map_camera())
