@@ -13,7 +13,6 @@ from airground.slam import so3
 from airground.slam.inertial.preintegration import GRAVITY, ImuBuffer, Preintegration
 from tests.slam.inertial_motion import ADIS16448, lively, read_imu, to_ns
 
-pytestmark = pytest.mark.kernel
 ZERO = np.zeros(3)
 
 
@@ -44,6 +43,7 @@ def slow_sum(samples, start, end, gyro_bias, force_bias):
     return R, v, p
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("seconds", [(0.0102, 0.0431), (0.1, 0.6), (0.0011, 0.0042), (-0.01, 1.2)])
 def test_sums_like_the_slow_twin(seed, seconds):
