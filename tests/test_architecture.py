@@ -30,6 +30,7 @@ DISTRIBUTION_OF = {
     "skimage": "scikit-image",
     "small_gicp": "small-gicp",
     "tomli_w": "tomli-w",
+    "yaml": "pyyaml",
 }
 """Imports whose package is called otherwise."""
 

@@ -33,13 +33,27 @@ def read_depth(path: Path, width: int, height: int, units_per_m: float) -> NDArr
     return depth
 
 
-def _read(path: Path, shape: tuple[int, ...], dtype: type[np.generic]) -> NDArray:
+def image_size(path: Path) -> tuple[int, int]:
+    """Width and height [px], from the file's first bytes; raises RecordingError."""
+    data = _bytes(path)
+    if len(data) < 24:
+        raise RecordingError(f"{path}: is truncated: the PNG image has no size")
+    return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
+
+
+def _bytes(path: Path) -> bytes:
+    """A file that starts as PNG files do."""
     try:
         data = path.read_bytes()
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None
     if not data.startswith(_PNG_START):
         raise RecordingError(f"{path}: is no PNG image")
+    return data
+
+
+def _read(path: Path, shape: tuple[int, ...], dtype: type[np.generic]) -> NDArray:
+    data = _bytes(path)
     if not data.endswith(_PNG_END):
         raise RecordingError(f"{path}: is truncated: the PNG image has no end")
     image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)

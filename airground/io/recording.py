@@ -25,6 +25,15 @@ from airground.io.digests import path_digest
 from airground.io.euroc import read_image_list, read_imu, read_magnetic
 from airground.io.header import Header, read_header
 from airground.io.images import read_colour, read_depth, read_grey
+from airground.io.message_order import bundles
+from airground.io.plausibility import (
+    CAMERA_STEP_S,
+    IMU_STEP_S,
+    check_imu_covers,
+    check_stamp_unit,
+    check_up_in_body,
+    upwards,
+)
 from airground.io.tum import read_associations
 
 
@@ -91,6 +100,7 @@ class Recording:
             ground_colour_files=tuple(ground_folder / name for name in colour_names),
             ground_depth_files=tuple(ground_folder / name for name in depth_names),
         )
+        recording._check_samples()
         recording._check_images()
         return recording
 
@@ -130,29 +140,42 @@ class Recording:
             RecordingError: An image cannot be read or does not fit the calibration.
         """
         streams = (
-            _with_samples(
-                Source.GROUND, self.ground_images(), self.ground_imu, self.ground_magnetic
-            ),
-            _with_samples(Source.MAV, self.mav_images(), self.mav_imu, self.mav_magnetic),
+            bundles(Source.GROUND, self.ground_images(), self.ground_imu, self.ground_magnetic),
+            bundles(Source.MAV, self.mav_images(), self.mav_imu, self.mav_magnetic),
         )
         for _, bundle in heapq.merge(*streams, key=lambda stamped_bundle: stamped_bundle[0]):
             yield from bundle
 
     def mav_images(self) -> Iterator[MavImage]:
         for index in range(len(self.mav_camera_stamps)):
-            yield self._mav_image(index)
+            yield self.read_mav_image(index)
 
     def ground_images(self) -> Iterator[GroundImage]:
         for index in range(len(self.ground_camera_stamps)):
-            yield self._ground_image(index)
+            yield self.read_ground_image(index)
 
     def mav_image_at(self, stamp_ns: int) -> MavImage:
         """The MAV's image with this stamp; ValueError if there is none."""
-        return self._mav_image(_index_of(self.mav_camera_stamps, stamp_ns))
+        return self.read_mav_image(_index_of(self.mav_camera_stamps, stamp_ns))
 
     def ground_image_at(self, stamp_ns: int) -> GroundImage:
         """The ground robot's image with this stamp; ValueError if there is none."""
-        return self._ground_image(_index_of(self.ground_camera_stamps, stamp_ns))
+        return self.read_ground_image(_index_of(self.ground_camera_stamps, stamp_ns))
+
+    def read_mav_image(self, index: int) -> MavImage:
+        """The MAV's image at an index in `mav_camera_stamps`."""
+        camera = self.mav.camera
+        image = read_grey(self.mav_files[index], camera.width, camera.height)
+        return MavImage(int(self.mav_camera_stamps[index]), image)
+
+    def read_ground_image(self, index: int) -> GroundImage:
+        """The ground robot's image at an index in `ground_camera_stamps`."""
+        size = self.ground.camera.width, self.ground.camera.height
+        return GroundImage(
+            int(self.ground_camera_stamps[index]),
+            read_colour(self.ground_colour_files[index], *size),
+            read_depth(self.ground_depth_files[index], *size, self.depth_units_per_m),
+        )
 
     def verify(self) -> None:
         """Compare every file with the digests in `recording.toml`.
@@ -169,18 +192,20 @@ class Recording:
                     f"{place}: differs from what was recorded (its SHA-256 in {layout.HEADER})"
                 )
 
-    def _mav_image(self, index: int) -> MavImage:
-        camera = self.mav.camera
-        image = read_grey(self.mav_files[index], camera.width, camera.height)
-        return MavImage(int(self.mav_camera_stamps[index]), image)
-
-    def _ground_image(self, index: int) -> GroundImage:
-        size = self.ground.camera.width, self.ground.camera.height
-        return GroundImage(
-            int(self.ground_camera_stamps[index]),
-            read_colour(self.ground_colour_files[index], *size),
-            read_depth(self.ground_depth_files[index], *size, self.depth_units_per_m),
+    def _check_samples(self) -> None:
+        """Stamps are in their unit, inertial samples cover the images, gravity points down."""
+        robots = (
+            (self.mav, self.mav_camera_stamps, self.mav_imu, layout.MAV_IMU_DATA),
+            (self.ground, self.ground_camera_stamps, self.ground_imu, layout.GROUND_IMU_DATA),
         )
+        units = ("nanoseconds", "seconds")
+        lists = (layout.MAV_CAMERA_LIST, layout.GROUND_ASSOCIATIONS)
+        for (told, stamps, imu, imu_name), unit, name in zip(robots, units, lists, strict=True):
+            imu_file = self.path / imu_name
+            check_stamp_unit(stamps, self.path / name, unit, CAMERA_STEP_S)
+            check_stamp_unit(imu.stamps_ns, imu_file, "nanoseconds", IMU_STEP_S)
+            check_imu_covers(imu, imu_file, stamps, told.camera_time_offset_ns)
+            check_up_in_body(told.T_body_imu.rotation @ upwards(imu, imu_file), imu_file)
 
     def _check_images(self) -> None:
         """Every listed image exists, and the first of each camera fits its calibration."""
@@ -189,30 +214,8 @@ class Recording:
             for file in files:
                 if file not in present:
                     raise RecordingError(f"{file}: this image is listed but missing")
-        self._mav_image(0)
-        self._ground_image(0)
-
-
-def _with_samples(
-    robot: Source,
-    images: Iterator[MavImage] | Iterator[GroundImage],
-    imu: ImuSamples,
-    magnetic: MagneticSamples,
-) -> Iterator[tuple[int, list[Stamped]]]:
-    """Each image with the samples since the one before it; its stamp comes first."""
-    previous = np.iinfo(np.int64).min
-    for image in images:
-        bundle = []
-        inertial = imu.between(previous, image.stamp_ns)
-        if len(inertial.stamps_ns):
-            bundle.append(Stamped(robot, inertial))
-        low, high = np.searchsorted(magnetic.stamps_ns, [previous, image.stamp_ns], side="right")
-        if high > low:
-            field = MagneticSamples(magnetic.stamps_ns[low:high], magnetic.field[low:high])
-            bundle.append(Stamped(robot, field))
-        bundle.append(Stamped(robot, image))
-        yield image.stamp_ns, bundle
-        previous = image.stamp_ns
+        self.read_mav_image(0)
+        self.read_ground_image(0)
 
 
 def _listing(folder: Path) -> list[Path]:

@@ -109,6 +109,29 @@ def read_associations(path: Path) -> tuple[NDArray[np.int64], list[str], list[st
     return array, colour, depth
 
 
+def read_image_list(path: Path) -> tuple[NDArray[np.int64], list[str]]:
+    """Stamps (N,) [ns] and file names, relative to the list's folder, as in `rgb.txt`.
+
+    Raises:
+        RecordingError: Names the file and the line or stamp that is wrong.
+    """
+    stamps, names = [], []
+    for number, line in _entries(path):
+        fields = line.split()
+        if len(fields) != 2:
+            raise RecordingError(
+                f"{path}:{number}: expected 'timestamp filename', got '{line[:60]}'"
+            )
+        try:
+            stamps.append(parse_stamp(fields[0]))
+        except ValueError as error:
+            raise RecordingError(f"{path}:{number}: {error}") from None
+        names.append(fields[1])
+    array = np.array(stamps, np.int64)
+    check_stamps(array, path)
+    return array, names
+
+
 def write_image_lists(folder: Path, stamps_ns: NDArray[np.int64], names: list[str]) -> None:
     """Write `rgb.txt`, `depth.txt` and `associations.txt` for images of the same names."""
     entries = list(zip([format_stamp(int(t)) for t in stamps_ns], names, strict=True))

@@ -65,7 +65,8 @@ def calibration() -> CalibrationTable:
 def imu_samples() -> ImuSamples:
     rng = np.random.default_rng(1)
     n = len(SAMPLE_STAMPS)
-    return ImuSamples(SAMPLE_STAMPS, rng.normal(size=(n, 3)), rng.normal(size=(n, 3)))
+    gravity = np.array([0.0, 0.0, 9.81])
+    return ImuSamples(SAMPLE_STAMPS, rng.normal(size=(n, 3)), gravity + rng.normal(size=(n, 3)))
 
 
 def magnetic_samples() -> MagneticSamples:

@@ -1,0 +1,91 @@
+"""Lens distortion, removed from images as they are read.
+
+Every image becomes one of a pinhole camera of the same size, in which no pixel lies outside
+the original image (OpenCV's `getOptimalNewCameraMatrix` with alpha 0): a black rim would
+look like structure to a tracker. A lens without distortion leaves images as they are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.camera import PinholeCamera
+
+
+@dataclass(frozen=True)
+class Lens:
+    """A camera as its calibration has it: a pinhole and radial-tangential distortion.
+
+    Attributes:
+        width, height: Image size [px].
+        intrinsics: fx, fy, cx, cy [px]; integer pixel coordinates are pixel centres.
+        distortion: k1, k2, p1, p2 and, where there is a fifth, k3.
+    """
+
+    width: int
+    height: int
+    intrinsics: tuple[float, float, float, float]
+    distortion: tuple[float, ...]
+
+    def matrix(self) -> NDArray[np.float64]:
+        """The (3, 3) intrinsic matrix."""
+        fx, fy, cx, cy = self.intrinsics
+        return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
+
+
+class Undistortion:
+    """Turns images through a lens into images of the pinhole camera `camera`.
+
+    Args:
+        lens: The lens.
+    """
+
+    def __init__(self, lens: Lens) -> None:
+        self._maps: tuple[NDArray, NDArray] | None = None
+        self._nearest: NDArray | None = None
+        size = (lens.width, lens.height)
+        matrix = original = lens.matrix()
+        if any(lens.distortion):
+            distortion = np.array(lens.distortion)
+            optimal, _ = cv2.getOptimalNewCameraMatrix(original, distortion, size, 0.0, size)
+            matrix = np.asarray(optimal, np.float64)
+            x, y = cv2.initUndistortRectifyMap(
+                original, distortion, np.eye(3), matrix, size, cv2.CV_32FC1
+            )
+            self._maps = cv2.convertMaps(x, y, cv2.CV_16SC2)
+            self._nearest, _ = cv2.convertMaps(x, y, cv2.CV_16SC2, nninterpolation=True)
+        self.camera = PinholeCamera(
+            *size,
+            fx=float(matrix[0, 0]),
+            fy=float(matrix[1, 1]),
+            cx=float(matrix[0, 2]),
+            cy=float(matrix[1, 2]),
+        )
+
+    def image(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Grey (H, W) or colour (H, W, 3), interpolated."""
+        if self._maps is None:
+            return image
+        return np.asarray(cv2.remap(image, *self._maps, cv2.INTER_LINEAR), np.uint8)
+
+    def depth(self, depth: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(H, W) [m]; nearest pixel, so that neither edges nor holes (NaN) are blurred.
+
+        Depth along the optical axis is the same in both cameras: their axes coincide.
+        """
+        if self._nearest is None:
+            return depth
+        nothing = np.zeros((0, 0), np.uint16)
+        straight = cv2.remap(
+            depth,
+            self._nearest,
+            nothing,
+            cv2.INTER_NEAREST,
+            borderMode=cv2.BORDER_CONSTANT,
+            borderValue=float("nan"),
+        )
+        return np.asarray(straight, np.float32)

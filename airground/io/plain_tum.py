@@ -1,0 +1,178 @@
+"""Plain TUM RGB-D folders, as TU Munich and those who follow them ship them.
+
+    rgb.txt  rgb/*.png        colour, 8 bit
+    depth.txt  depth/*.png    16 bit, 5000 a metre, 0 is missing, registered to the colour
+    accelerometer.txt         of a Kinect; may be missing
+
+No calibration is shipped: it is the published one of the Kinect that the folder's name
+tells, or comes from a file. There is no gyro, so these recordings have no IMU; the
+accelerometer only says what is up as the recording starts.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.cloud import Source
+from airground.core.messages import GroundImage, RobotCalibration
+from airground.core.se3 import SE3
+from airground.errors import RecordingError
+from airground.io.associate import associate
+from airground.io.euroc import read_lines
+from airground.io.images import image_size, read_colour, read_depth
+from airground.io.lens import Lens, Undistortion
+from airground.io.plausibility import CAMERA_STEP_S, check_stamp_unit, level_body
+from airground.io.robot_recording import RobotRecording
+from airground.io.sensor_file import read_lens
+from airground.io.tum import parse_stamp, read_image_list
+
+DEPTH_UNITS_PER_M = 5000.0
+MAX_DIFFERENCE_NS = 20_000_000
+CALIBRATION_NAMES = ("calibration.yaml", "sensor.yaml", "calibration.toml")
+LISTS = ("rgb.txt", "depth.txt", "accelerometer.txt")
+
+PUBLISHED = {
+    "freiburg1": Lens(
+        640, 480, (517.3, 516.5, 318.6, 255.3), (0.2624, -0.9531, -0.0054, 0.0026, 1.1633)
+    ),
+    "freiburg2": Lens(
+        640, 480, (520.9, 521.0, 325.1, 249.7), (0.2312, -0.7849, -0.0033, -0.0001, 0.9172)
+    ),
+    "freiburg3": Lens(640, 480, (535.4, 539.2, 320.1, 247.6), (0.0, 0.0, 0.0, 0.0, 0.0)),
+}
+"""The colour cameras as the data set's authors calibrated them."""
+
+ACCELEROMETER_AXES = np.array([-1.0, -1.0, 1.0])
+"""A Kinect's accelerometer counts left and up positive: times this it is in camera axes."""
+START_S = 0.1
+UP_LEVEL_CAMERA = np.array([0.0, -1.0, 0.0])
+"""What is up in a camera that looks straight ahead; assumed where nothing measures it."""
+
+
+def is_tum_folder(path: Path) -> bool:
+    return (path / "rgb.txt").is_file()
+
+
+def open_tum(path: Path, calibration_file: Path | None = None) -> RobotRecording:
+    """Open a folder of colour and depth images and check all but the images.
+
+    Colour and depth are paired by their stamps, one to one, nearest first, at most 20 ms
+    apart; a frame has the stamp of its colour image. What finds no partner is left out.
+
+    Args:
+        path: The folder with `rgb.txt`.
+        calibration_file: Of the colour camera, in the form of EuRoC's `sensor.yaml`.
+
+    Raises:
+        RecordingError: One line that names file, key or stamp and what would be right.
+    """
+    lens = _lens(path, calibration_file)
+    undistortion = Undistortion(lens)
+    colour_stamps, colour_names = _image_list(path / "rgb.txt")
+    depth_stamps, depth_names = _image_list(path / "depth.txt")
+    colour, depth = associate(colour_stamps, depth_stamps, MAX_DIFFERENCE_NS)
+    if len(colour) == 0:
+        raise RecordingError(
+            f"{path / 'depth.txt'}: no depth image is within 20 ms of a colour image of "
+            "rgb.txt; both must be stamped by the same clock"
+        )
+    stamps = colour_stamps[colour]
+    files = [
+        (path / colour_names[c], path / depth_names[d]) for c, d in zip(colour, depth, strict=True)
+    ]
+    missing = next((file for pair in files for file in pair if not file.is_file()), None)
+    if missing is not None:
+        raise RecordingError(f"{missing}: this image is listed but missing")
+
+    def read_image(index: int) -> GroundImage:
+        colour_file, depth_file = files[index]
+        colour = read_colour(colour_file, lens.width, lens.height)
+        _check_same_size(depth_file, colour)
+        depth = read_depth(depth_file, lens.width, lens.height, DEPTH_UNITS_PER_M)
+        return GroundImage(
+            int(stamps[index]), undistortion.image(colour), undistortion.depth(depth)
+        )
+
+    read_image(0)
+    level = level_body(_up_at_start(path, int(stamps[0])), SE3.identity())
+    return RobotRecording(
+        path=path,
+        layout="tum",
+        robot=Source.GROUND,
+        calibration=RobotCalibration(undistortion.camera, SE3.identity(), level),
+        camera_stamps=stamps,
+        imu=None,
+        magnetic=None,
+        read_image=read_image,
+        pose_frame="camera",
+        T_pose_camera=SE3.identity(),
+    )
+
+
+def _lens(path: Path, calibration_file: Path | None) -> Lens:
+    """From the file that the user names, one beside the images, or the published table."""
+    candidates = [path / name for name in CALIBRATION_NAMES]
+    file = calibration_file or next((f for f in candidates if f.is_file()), None)
+    if file is not None:
+        return read_lens(file)
+    # The name of the recording stands in the folder's name, and in comments of the lists.
+    comments = [
+        line
+        for name in LISTS
+        if (path / name).is_file()
+        for line in read_lines(path / name)[:3]
+        if line.startswith("#")
+    ]
+    for text in (path.resolve().name, *comments):
+        kinect = re.search(r"(?:freiburg|fr)([123])(?![0-9])", text)
+        if kinect:
+            return PUBLISHED[f"freiburg{kinect[1]}"]
+    raise RecordingError(
+        f"{path}: the camera's calibration is missing: give it with --calibration FILE, or as "
+        "calibration.yaml in the folder (keys resolution, intrinsics, distortion_model, "
+        "distortion_coefficients); only names with freiburg1, 2 or 3 have a published one"
+    )
+
+
+def _image_list(path: Path) -> tuple[NDArray[np.int64], list[str]]:
+    stamps, names = read_image_list(path)
+    check_stamp_unit(stamps, path, "seconds", CAMERA_STEP_S)
+    return stamps, names
+
+
+def _check_same_size(depth_file: Path, colour: NDArray[np.uint8]) -> None:
+    width, height = image_size(depth_file)
+    if (height, width) != colour.shape[:2]:
+        raise RecordingError(
+            f"{depth_file}: depth is {width}x{height}, its colour image is "
+            f"{colour.shape[1]}x{colour.shape[0]}; depth must be registered to the colour "
+            "image and of its size"
+        )
+
+
+def _up_at_start(path: Path, stamp_ns: int) -> NDArray[np.float64]:
+    """(3,) unit vector, up in the camera as the first image was taken."""
+    file = path / "accelerometer.txt"
+    if not file.is_file():
+        return UP_LEVEL_CAMERA
+    readings = []
+    for number, line in enumerate(read_lines(file), start=1):
+        if not line.strip() or line.startswith("#"):
+            continue
+        try:
+            time, *values = line.split()
+            reading = np.array([float(value) for value in values])
+            near = abs(parse_stamp(time) - stamp_ns) <= START_S * 1e9
+        except ValueError as error:
+            raise RecordingError(f"{file}:{number}: {error}") from None
+        if reading.shape != (3,) or not np.isfinite(reading).all():
+            raise RecordingError(f"{file}:{number}: expected 'timestamp ax ay az', got '{line}'")
+        if near:
+            readings.append(reading)
+    up = np.mean(readings, axis=0) * ACCELEROMETER_AXES if readings else np.zeros(3)
+    length = float(np.linalg.norm(up))
+    return up / length if length > 1.0 else UP_LEVEL_CAMERA
