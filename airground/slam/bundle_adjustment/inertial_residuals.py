@@ -1,0 +1,170 @@
+"""Errors of inertial motion between keyframes, linearized.
+
+Forster, Carlone, Dellaert and Scaramuzza, "On-manifold preintegration for real-time
+visual-inertial odometry", T-RO 2017, Eq. 44 and 45, and the random walk of the biases (Eq. 47);
+Jacobians by rotations on the left, R <- exp(dphi) R, as in `residuals`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from airground.slam import so3
+from airground.slam.bundle_adjustment.problem import InertialFactor
+from airground.slam.inertial.preintegration import GRAVITY_MAP
+
+
+@dataclass(frozen=True, eq=False)
+class PackedMotions:
+    """All inertial factors, one array for each quantity.
+
+    Attributes:
+        firsts: (F,) keyframe each motion starts from; it ends in the next.
+        durations: (F,) [s].
+        rotations: (F, 3, 3).
+        velocities, positions: (F, 3).
+        biases: (F, 6) gyro and accelerometer, where it was linearized.
+        by_biases: (F, 9, 6) change of rotation, velocity and position with them.
+        whitening: (F, 15, 15) turns a residual into one of unit covariance.
+    """
+
+    firsts: NDArray[np.int64]
+    durations: NDArray[np.float64]
+    rotations: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    biases: NDArray[np.float64]
+    by_biases: NDArray[np.float64]
+    whitening: NDArray[np.float64]
+
+
+def pack(factors: Sequence[InertialFactor]) -> PackedMotions:
+    """Lay factors out for the kernel."""
+    count = len(factors)
+    motions = [factor.preintegration for factor in factors]
+    by_biases = np.zeros((count, 9, 6))
+    whitening = np.zeros((count, 15, 15))
+    for n, motion in enumerate(motions):
+        by_biases[n, 0:3, 0:3] = motion.rotation_by_gyro_bias
+        by_biases[n, 3:6, 0:3] = motion.velocity_by_gyro_bias
+        by_biases[n, 3:6, 3:6] = motion.velocity_by_accelerometer_bias
+        by_biases[n, 6:9, 0:3] = motion.position_by_gyro_bias
+        by_biases[n, 6:9, 3:6] = motion.position_by_accelerometer_bias
+        lower = np.linalg.cholesky(motion.covariance)
+        whitening[n, :9, :9] = solve_triangular(lower, np.eye(9), lower=True)
+        walk = np.repeat([motion.gyro_bias_sigma, motion.accelerometer_bias_sigma], 3)
+        whitening[n, range(9, 15), range(9, 15)] = 1.0 / walk
+    biases = [np.concatenate([m.gyro_bias, m.accelerometer_bias]) for m in motions]
+    return PackedMotions(
+        firsts=np.array([factor.first for factor in factors], np.int64),
+        durations=np.array([m.duration_s for m in motions], np.float64),
+        rotations=np.array([m.rotation for m in motions]).reshape(count, 3, 3),
+        velocities=np.array([m.velocity for m in motions]).reshape(count, 3),
+        positions=np.array([m.position for m in motions]).reshape(count, 3),
+        biases=np.array(biases).reshape(count, 6),
+        by_biases=by_biases,
+        whitening=whitening,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def motion_residual(
+    first: NDArray,
+    second: NDArray,
+    R_first: NDArray,
+    R_second: NDArray,
+    motion: tuple,
+    jacobian: NDArray,
+) -> NDArray[np.float64]:
+    """(15,) residual of one motion: rotation, velocity, position, walk of the biases.
+
+    Args:
+        first, second: (12,) position, velocity, gyro bias, accelerometer bias.
+        R_first, R_second: (3, 3).
+        motion: Duration, rotation, velocity, position, biases and their Jacobians.
+        jacobian: (15, 30) by both 15-vectors, overwritten.
+    """
+    seconds, rotation, velocity, position, biases, by_biases = motion
+    correction = by_biases @ (first[6:12] - biases)
+    turn = rotation @ so3.exp(correction[0:3])
+    back = np.ascontiguousarray(R_first.T)
+    error = turn.T @ back @ R_second
+    faster = second[3:6] - first[3:6] - seconds * GRAVITY_MAP
+    farther = second[0:3] - first[0:3] - seconds * first[3:6]
+    farther -= 0.5 * seconds * seconds * GRAVITY_MAP
+    residual = np.empty(15)
+    residual[0:3] = so3.log(error)
+    residual[3:6] = back @ faster - velocity - correction[3:6]
+    residual[6:9] = back @ farther - position - correction[6:9]
+    residual[9:15] = second[6:12] - first[6:12]
+
+    jacobian[:] = 0.0
+    unrolled = so3.right_jacobian_inverse(residual[0:3])
+    by_turn = unrolled @ np.ascontiguousarray(R_second.T)
+    jacobian[0:3, 0:3] = -by_turn
+    jacobian[0:3, 15:18] = by_turn
+    gyro = so3.right_jacobian(correction[0:3]) @ np.ascontiguousarray(by_biases[0:3, 0:3])
+    jacobian[0:3, 9:12] = -unrolled @ np.ascontiguousarray(error.T) @ gyro
+    jacobian[3:6, 0:3] = back @ so3.hat(faster)
+    jacobian[3:6, 6:9] = -back
+    jacobian[3:6, 21:24] = back
+    jacobian[6:9, 0:3] = back @ so3.hat(farther)
+    jacobian[6:9, 3:6] = -back
+    jacobian[6:9, 6:9] = -seconds * back
+    jacobian[6:9, 18:21] = back
+    jacobian[3:9, 9:15] = -by_biases[3:9]
+    for n in range(6):
+        jacobian[9 + n, 9 + n] = -1.0
+        jacobian[9 + n, 24 + n] = 1.0
+    return residual
+
+
+@njit(cache=True, error_model="numpy")
+def linearize_motions(
+    firsts: NDArray,
+    durations: NDArray,
+    rotations: NDArray,
+    velocities: NDArray,
+    positions: NDArray,
+    biases: NDArray,
+    by_biases: NDArray,
+    whitening: NDArray,
+    R_map_rig: NDArray,
+    vectors: NDArray,
+    residuals: NDArray,
+    jacobians: NDArray,
+) -> float:
+    """The cost of all motions; whitened `residuals` (F, 15) and `jacobians` (F, 15, 30).
+
+    Args:
+        firsts, durations, rotations, velocities, positions, biases, by_biases, whitening: Of
+            `PackedMotions`.
+        R_map_rig: (K, 3, 3).
+        vectors: (K, 12) position, velocity, gyro bias, accelerometer bias.
+        residuals, jacobians: Overwritten.
+    """
+    total = 0.0
+    jacobian = np.empty((15, 30))
+    for n in range(len(firsts)):
+        k = firsts[n]
+        motion = (
+            durations[n],
+            rotations[n],
+            velocities[n],
+            positions[n],
+            biases[n],
+            by_biases[n],
+        )
+        raw = motion_residual(
+            vectors[k], vectors[k + 1], R_map_rig[k], R_map_rig[k + 1], motion, jacobian
+        )
+        residuals[n] = whitening[n] @ raw
+        jacobians[n] = whitening[n] @ jacobian
+        total += 0.5 * np.dot(residuals[n], residuals[n])
+    return total

@@ -1,0 +1,86 @@
+"""What is known of single keyframes beforehand: gauge, rest, size of the biases."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from airground.slam import so3
+from airground.slam.bundle_adjustment.problem import Role, Settings, States
+
+ROWS = 13
+"""Of a keyframe: position (3), heading, velocity (3), gyro bias (3), accelerometer bias (3)."""
+GAUGE_SIGMA = 1e-4
+"""How tightly the gauge is held [m], [rad]: no observation competes with it, so that this is
+as good as exact, and still well within the range of double precision."""
+
+
+def prior_sharpness(
+    states: States,
+    roles: NDArray[np.int64],
+    firsts: NDArray[np.int64],
+    settings: Settings,
+) -> NDArray[np.float64]:
+    """(K, ROWS) one over the sigma of every prior; 0 where there is none.
+
+    Args:
+        states: Says where the robot was still.
+        roles: (K,).
+        firsts: (F,) keyframe each inertial motion starts from.
+        settings: The sigmas.
+    """
+    sharpness = np.zeros((len(states), ROWS))
+    sharpness[roles == Role.GAUGE, 0:4] = 1.0 / GAUGE_SIGMA
+    if states.still is not None:
+        sharpness[states.still, 4:7] = 1.0 / settings.still_sigma
+    # A keyframe that no motion leads to: nothing before it says anything about its biases.
+    begins = np.setdiff1d(firsts, firsts + 1)
+    if settings.gyro_bias_prior_sigma is not None:
+        sharpness[begins, 7:10] = 1.0 / settings.gyro_bias_prior_sigma
+    if settings.accelerometer_bias_prior_sigma is not None:
+        sharpness[begins, 10:13] = 1.0 / settings.accelerometer_bias_prior_sigma
+    sharpness[roles == Role.FIXED] = 0.0
+    return sharpness
+
+
+@njit(cache=True, error_model="numpy")
+def linearize_priors(
+    sharpness: NDArray,
+    start_rotations: NDArray,
+    start_vectors: NDArray,
+    rotations: NDArray,
+    vectors: NDArray,
+    residuals: NDArray,
+    headings: NDArray,
+) -> float:
+    """The cost of all priors; whitened `residuals` (K, ROWS) and `headings` (K, 3).
+
+    All but the heading depend on one number of the state each; `headings` is how the heading
+    changes with the keyframe's turn, whitened. Heading is the vertical part of the rotation
+    vector that leads from the keyframe at the start to the one now.
+
+    Args:
+        sharpness: Of `prior_sharpness`.
+        start_rotations, start_vectors: Where the gauge is held.
+        rotations: (K, 3, 3).
+        vectors: (K, 12) position, velocity, gyro bias, accelerometer bias.
+        residuals, headings: Overwritten.
+    """
+    total = 0.0
+    for k in range(len(sharpness)):
+        sharp = sharpness[k]
+        residual = residuals[k]
+        headings[k] = 0.0
+        residual[3] = 0.0
+        if sharp[3] > 0.0:
+            turn = so3.log(rotations[k] @ start_rotations[k].T)
+            residual[3] = sharp[3] * turn[2]
+            # The left Jacobian is the right one's transpose.
+            headings[k] = sharp[3] * so3.right_jacobian_inverse(turn)[:, 2]
+        for n in range(3):
+            residual[n] = sharp[n] * (vectors[k, n] - start_vectors[k, n])
+        for n in range(9):
+            residual[4 + n] = sharp[4 + n] * vectors[k, 3 + n]
+        total += 0.5 * np.dot(residual, residual)
+    return total

@@ -1,0 +1,195 @@
+"""What goes into bundle adjustment and what comes out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.arrays import read_only
+from airground.slam.inertial.preintegration import Preintegration
+
+
+class Role(IntEnum):
+    """What may become of a keyframe."""
+
+    FREE = 0
+    FIXED = 1
+    GAUGE = 2
+    """Position and heading are held, so that the map stays in place; the tilt is free."""
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """K keyframes in order of time.
+
+    Attributes:
+        rotations, positions: (K, 3, 3) and (K, 3) `T_map_rig` [m].
+        velocities: (K, 3) in the map [m/s].
+        gyro_biases, accelerometer_biases: (K, 3) [rad/s], [m/s^2].
+        still: (K,) bool, where the robot was seen to be at rest; None for nowhere.
+
+    Raises:
+        ValueError: A shape is wrong or a number is not finite.
+    """
+
+    rotations: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    gyro_biases: NDArray[np.float64]
+    accelerometer_biases: NDArray[np.float64]
+    still: NDArray[np.bool_] | None = None
+
+    def __post_init__(self) -> None:
+        rotations = read_only(self.rotations, "rotations", (None, 3, 3), np.float64)
+        arrays = {"rotations": rotations}
+        for name in ("positions", "velocities", "gyro_biases", "accelerometer_biases"):
+            shape = (len(rotations), 3)
+            arrays[name] = read_only(getattr(self, name), name, shape, np.float64)
+        for name, array in arrays.items():
+            if not np.isfinite(array).all():
+                raise ValueError(f"{name}: keyframe {_first_bad(array)} is not finite")
+            object.__setattr__(self, name, array)
+        if self.still is not None:
+            still = read_only(self.still, "still", (len(rotations),), np.bool_)
+            object.__setattr__(self, "still", still)
+
+    def __len__(self) -> int:
+        return len(self.rotations)
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """M sightings of points; a keyframe sees a point at most once.
+
+    Attributes:
+        keyframes, points: (M,) int64, indices.
+        pixels: (M, 2) where the point was seen [px].
+        sigmas_px: (M,) standard deviation of each coordinate [px].
+        inverse_depths: (M,) measured, along the optical axis [1/m]; NaN where there is none.
+        inverse_depth_sigmas: (M,) [1/m]; not read where there is no inverse depth.
+
+    Raises:
+        ValueError: A shape is wrong, a pixel is not finite, or a sigma is not positive.
+    """
+
+    keyframes: NDArray[np.int64]
+    points: NDArray[np.int64]
+    pixels: NDArray[np.float64]
+    sigmas_px: NDArray[np.float64]
+    inverse_depths: NDArray[np.float64]
+    inverse_depth_sigmas: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        m = len(self.keyframes)
+        for name in ("keyframes", "points"):
+            object.__setattr__(self, name, read_only(getattr(self, name), name, (m,), np.int64))
+        pixels = read_only(self.pixels, "pixels", (m, 2), np.float64)
+        object.__setattr__(self, "pixels", pixels)
+        for name in ("sigmas_px", "inverse_depths", "inverse_depth_sigmas"):
+            object.__setattr__(self, name, read_only(getattr(self, name), name, (m,), np.float64))
+        if not np.isfinite(pixels).all():
+            raise ValueError(f"pixels: observation {_first_bad(pixels)} is not finite")
+        if not (self.sigmas_px > 0).all():
+            raise ValueError("sigmas_px must be positive")
+        if not ((self.inverse_depth_sigmas > 0) | np.isnan(self.inverse_depths)).all():
+            raise ValueError("inverse_depth_sigmas must be positive where there is a depth")
+
+    def __len__(self) -> int:
+        return len(self.keyframes)
+
+
+@dataclass(frozen=True, eq=False)
+class InertialFactor:
+    """Inertial motion from one keyframe to the next.
+
+    Attributes:
+        first, second: Indices of keyframes, second = first + 1.
+        preintegration: Between their times.
+    """
+
+    first: int
+    second: int
+    preintegration: Preintegration
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How to adjust.
+
+    Attributes:
+        iterations: Most steps tried: 8 for a window, 15 for a whole map.
+        huber: Whitened residual from which a cost grows linearly.
+        relative_decrease: A step that lowers the cost by a smaller share is the last one.
+        gyro_bias_prior_sigma: [rad/s] toward zero, on a keyframe that no inertial motion
+            leads to; None for no prior.
+        accelerometer_bias_prior_sigma: The same [m/s^2].
+        still_sigma: Of the velocity of a robot at rest [m/s].
+    """
+
+    iterations: int = 8
+    huber: float = 1.5
+    relative_decrease: float = 1e-5
+    gyro_bias_prior_sigma: float | None = 0.05
+    accelerometer_bias_prior_sigma: float | None = 0.3
+    still_sigma: float = 0.005
+
+
+@dataclass(frozen=True, eq=False)
+class Adjustment:
+    """What bundle adjustment found.
+
+    Attributes:
+        states, points: The keyframes and (P, 3) points [m] at the optimum.
+        residuals_px: (M,) distance from where each point was seen to where it should have
+            been [px]; NaN behind the camera.
+        cost_before, cost_after: Half the sum of squared whitened residuals, linear beyond
+            the Huber threshold.
+        iterations: Steps tried.
+        covariance: (6, 6) of the pose of the last FREE keyframe: position [m], rotation
+            vector of estimate times inverse truth [rad], in the map's axes. None where there
+            is no such keyframe or the problem does not determine it.
+    """
+
+    states: States
+    points: NDArray[np.float64]
+    residuals_px: NDArray[np.float64]
+    cost_before: float
+    cost_after: float
+    iterations: int
+    covariance: NDArray[np.float64] | None
+
+
+def check(
+    states: States,
+    roles: NDArray[np.int64],
+    points: NDArray[np.float64],
+    observations: Observations,
+    inertial: Sequence[InertialFactor],
+) -> None:
+    """Raise ValueError where the parts of a problem do not fit together."""
+    count = len(states)
+    if not np.isin(roles, [int(role) for role in Role]).all():
+        raise ValueError("roles: expected FREE, FIXED or GAUGE")
+    if not np.isfinite(points).all():
+        raise ValueError(f"points: point {_first_bad(points)} is not finite")
+    for name, indices, size in (
+        ("keyframes", observations.keyframes, count),
+        ("points", observations.points, len(points)),
+    ):
+        if len(indices) and not (indices.min() >= 0 and indices.max() < size):
+            raise ValueError(f"observations: {name} must lie in 0..{size - 1}")
+    for factor in inertial:
+        if not 0 <= factor.first == factor.second - 1 < count - 1:
+            raise ValueError(
+                f"inertial factor {factor.first} to {factor.second}: "
+                f"expected neighbours among {count} keyframes"
+            )
+
+
+def _first_bad(array: NDArray[np.float64]) -> int:
+    finite = np.isfinite(array.reshape(len(array), -1)).all(axis=1)
+    return int(np.argmin(finite))

@@ -1,0 +1,161 @@
+"""Errors of reprojection and inverse depth, linearized.
+
+A point X at offset d = X - p from the rig's position p moves in the camera by
+
+    dx = R_camera_map (dX - dp + d x dphi)
+
+when the rig turns by dphi in the map's axes (R <- exp(dphi) R, the same as R <- R exp(R' dphi)).
+With A the residual's Jacobian by X, that by (dphi, dp) is therefore A G, G = [hat(d), -I]: all
+that the normal equations need of an observation are B = A'WA, A'Wr and d.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+MIN_DEPTH = 1e-3
+"""Nearer than this [m] is behind the camera."""
+BEHIND_SIGMAS = 50.0
+"""What an observation behind the camera costs, as if it were off by so much. It does not pull,
+but it must not be a bargain either, or steps would turn points behind cameras."""
+NUMBERS = 12
+"""Of a linearized observation: B (xx, xy, xz, yy, yz, zz), A'Wr (3), d (3)."""
+FASTMATH = {"contract", "reassoc", "arcp", "nsz"}
+
+
+@njit(cache=True, error_model="numpy")
+def huber(square: float, threshold: float) -> tuple[float, float]:
+    """Cost and weight of a whitened residual of this squared norm."""
+    if square <= threshold * threshold:
+        return 0.5 * square, 1.0
+    norm = np.sqrt(square)
+    return threshold * (norm - 0.5 * threshold), threshold / norm
+
+
+@njit(cache=True, error_model="numpy")
+def camera_poses(
+    rotations: NDArray, positions: NDArray, R_rig_camera: NDArray, t_rig_camera: NDArray
+) -> tuple[NDArray, NDArray]:
+    """`R_camera_map` (K, 3, 3) and the camera centres (K, 3) in the map."""
+    count = len(rotations)
+    turned = np.empty((count, 3, 3))
+    centres = np.empty((count, 3))
+    for k in range(count):
+        turned[k] = R_rig_camera.T @ rotations[k].T
+        centres[k] = positions[k] + rotations[k] @ t_rig_camera
+    return turned, centres
+
+
+@njit(cache=True, error_model="numpy", fastmath=FASTMATH)
+def _row(scale: float, along: NDArray, tangent: float, axis: NDArray) -> tuple[float, float, float]:
+    """One row of A: how a pixel coordinate follows the point."""
+    return (
+        scale * (along[0] - tangent * axis[0]),
+        scale * (along[1] - tangent * axis[1]),
+        scale * (along[2] - tangent * axis[2]),
+    )
+
+
+@njit(cache=True, error_model="numpy", fastmath=FASTMATH)
+def linearize(
+    keyframes: NDArray,
+    points_seen: NDArray,
+    measured: NDArray,
+    positions: NDArray,
+    R_camera_map: NDArray,
+    centres: NDArray,
+    points: NDArray,
+    camera: NDArray,
+    threshold: float,
+    out: NDArray,
+) -> float:
+    """The cost of all observations, and in `out` (M, NUMBERS) their linearization.
+
+    Args:
+        keyframes, points_seen: (M,) int64.
+        measured: (M, 5) x and y [px], 1 / sigma [1/px], inverse depth [1/m] or NaN, 1 / sigma
+            [m].
+        positions: (K, 3) of the rig [m].
+        R_camera_map, centres: Of `camera_poses`.
+        points: (P, 3) [m].
+        camera: fx, fy, cx, cy [px].
+        threshold: Huber's.
+        out: Overwritten.
+    """
+    fx, fy, cx, cy = camera[0], camera[1], camera[2], camera[3]
+    behind, _ = huber(BEHIND_SIGMAS * BEHIND_SIGMAS, threshold)
+    total = 0.0
+    for m in range(len(keyframes)):
+        k, j = keyframes[m], points_seen[m]
+        r = R_camera_map[k]
+        ex = points[j, 0] - centres[k, 0]
+        ey = points[j, 1] - centres[k, 1]
+        ez = points[j, 2] - centres[k, 2]
+        x = r[0, 0] * ex + r[0, 1] * ey + r[0, 2] * ez
+        y = r[1, 0] * ex + r[1, 1] * ey + r[1, 2] * ez
+        z = r[2, 0] * ex + r[2, 1] * ey + r[2, 2] * ez
+        row = out[m]
+        if not z > MIN_DEPTH:
+            row[:] = 0.0
+            total += behind
+            continue
+        inverse = 1.0 / z
+        u, v = x * inverse, y * inverse
+        sharpness = measured[m, 2]
+        eu = (fx * u + cx - measured[m, 0]) * sharpness
+        ev = (fy * v + cy - measured[m, 1]) * sharpness
+        cost, weight = huber(eu * eu + ev * ev, threshold)
+        total += cost
+        su, sv = fx * inverse * sharpness, fy * inverse * sharpness
+        a0, a1, a2 = _row(su, r[0], u, r[2])
+        b0, b1, b2 = _row(sv, r[1], v, r[2])
+        c0 = c1 = c2 = ed = depth_weight = 0.0
+        if not np.isnan(measured[m, 3]):
+            ed = (inverse - measured[m, 3]) * measured[m, 4]
+            cost, depth_weight = huber(ed * ed, threshold)
+            total += cost
+            scale = -inverse * inverse * measured[m, 4]
+            c0, c1, c2 = scale * r[2, 0], scale * r[2, 1], scale * r[2, 2]
+        w, q = weight, depth_weight
+        row[0] = w * (a0 * a0 + b0 * b0) + q * c0 * c0
+        row[1] = w * (a0 * a1 + b0 * b1) + q * c0 * c1
+        row[2] = w * (a0 * a2 + b0 * b2) + q * c0 * c2
+        row[3] = w * (a1 * a1 + b1 * b1) + q * c1 * c1
+        row[4] = w * (a1 * a2 + b1 * b2) + q * c1 * c2
+        row[5] = w * (a2 * a2 + b2 * b2) + q * c2 * c2
+        row[6] = w * (a0 * eu + b0 * ev) + q * c0 * ed
+        row[7] = w * (a1 * eu + b1 * ev) + q * c1 * ed
+        row[8] = w * (a2 * eu + b2 * ev) + q * c2 * ed
+        row[9] = points[j, 0] - positions[k, 0]
+        row[10] = points[j, 1] - positions[k, 1]
+        row[11] = points[j, 2] - positions[k, 2]
+    return total
+
+
+@njit(cache=True, error_model="numpy")
+def reprojection_errors_px(
+    keyframes: NDArray,
+    points_seen: NDArray,
+    pixels: NDArray,
+    R_camera_map: NDArray,
+    centres: NDArray,
+    points: NDArray,
+    camera: NDArray,
+) -> NDArray[np.float64]:
+    """(M,) distance of each point from where it was seen [px]; NaN behind the camera."""
+    errors = np.full(len(keyframes), np.nan)
+    for m in range(len(keyframes)):
+        k, j = keyframes[m], points_seen[m]
+        x, y, z = 0.0, 0.0, 0.0
+        for n in range(3):
+            offset = points[j, n] - centres[k, n]
+            x += R_camera_map[k, 0, n] * offset
+            y += R_camera_map[k, 1, n] * offset
+            z += R_camera_map[k, 2, n] * offset
+        if z > MIN_DEPTH:
+            right = camera[0] * x / z + camera[2] - pixels[m, 0]
+            down = camera[1] * y / z + camera[3] - pixels[m, 1]
+            errors[m] = np.sqrt(right * right + down * down)
+    return errors

@@ -1,0 +1,194 @@
+"""Bundle adjustment by Levenberg-Marquardt."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
+from airground.core.camera import PinholeCamera
+from airground.core.se3 import SE3
+from airground.slam.bundle_adjustment import inertial_residuals, residuals
+from airground.slam.bundle_adjustment.normal_equations import (
+    Estimate,
+    Linearization,
+    Model,
+    NormalEquations,
+)
+from airground.slam.bundle_adjustment.priors import prior_sharpness
+from airground.slam.bundle_adjustment.problem import (
+    Adjustment,
+    InertialFactor,
+    Observations,
+    Role,
+    Settings,
+    States,
+    check,
+)
+from airground.slam.bundle_adjustment.sorting import sort_observations
+
+FIRST_DAMPING = 1e-5
+"""Windows start close to their optimum, where Gauss-Newton is best."""
+LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e4
+DAMPING_FACTOR = 10.0
+LEAST_PIVOT = 1e-10
+"""An unknown that keeps a smaller share of its information, given those before it, is open."""
+
+
+def adjust(
+    states: States,
+    roles: NDArray[np.int64],
+    points: NDArray[np.float64],
+    observations: Observations,
+    inertial: Sequence[InertialFactor],
+    camera: PinholeCamera,
+    T_rig_camera: SE3,
+    settings: Settings,
+) -> Adjustment:
+    """Move keyframes and points to where all measurements fit best.
+
+    Without inertial factors velocities and biases stay as they are. A point that nobody sees
+    stays; one seen once and without depth moves onto its ray.
+
+    Args:
+        states: K keyframes in order of time.
+        roles: (K,) `Role` of each.
+        points: (P, 3) in the map [m].
+        observations: Of the points in the keyframes.
+        inertial: Motions between neighbouring keyframes; the map's z axis must then point up.
+        camera: Of all keyframes.
+        T_rig_camera: The camera in the rig.
+        settings: Steps, robustness, priors.
+
+    Returns:
+        The optimum, or as near as the allowed steps came. The cost never rises.
+
+    Raises:
+        ValueError: The parts of the problem do not fit together, or are not finite.
+    """
+    roles = np.asarray(roles, np.int64).reshape(len(states))
+    points = np.array(points, np.float64).reshape(-1, 3)
+    check(states, roles, points, observations, inertial)
+    slots = np.where(roles == Role.FIXED, -1, np.cumsum(roles != Role.FIXED) - 1)
+    motions = inertial_residuals.pack(inertial)
+    seen = sort_observations(observations, slots, len(points))
+    start = _estimate(states, points)
+    model = Model(
+        seen,
+        motions,
+        prior_sharpness(states, roles, motions.firsts, settings),
+        slots,
+        camera,
+        T_rig_camera,
+        start,
+        settings.huber,
+    )
+    best, linear, cost_before, iterations = _descend(model, start, settings)
+    return Adjustment(
+        _states(best, states),
+        best.points,
+        _residuals_px(model, best, observations),
+        cost_before,
+        linear.cost,
+        iterations,
+        _last_covariance(model, linear, slots[roles == Role.FREE]),
+    )
+
+
+def _descend(
+    model: Model, start: Estimate, settings: Settings
+) -> tuple[Estimate, Linearization, float, int]:
+    """Levenberg-Marquardt with damping in proportion to the diagonal."""
+    best, linear = start, model.linearize(start)
+    cost_before = linear.cost
+    damping = FIRST_DAMPING
+    tried = 0
+    while tried < settings.iterations and damping <= MOST_DAMPING:
+        tried += 1
+        step = _solve(model.normal_equations(linear, damping), damping)
+        if step is None:
+            damping *= DAMPING_FACTOR
+            continue
+        trial = model.moved(best, linear, damping, step)
+        trial_linear = model.linearize(trial)
+        # Written so that a cost of NaN counts as worse.
+        if not trial_linear.cost <= linear.cost:
+            damping *= DAMPING_FACTOR
+            continue
+        decrease = linear.cost - trial_linear.cost
+        small = decrease <= settings.relative_decrease * linear.cost
+        best, linear = trial, trial_linear
+        damping = max(damping / DAMPING_FACTOR, LEAST_DAMPING)
+        if small:
+            break
+    return best, linear, cost_before, tried
+
+
+def _solve(equations: NormalEquations, damping: float) -> NDArray[np.float64] | None:
+    """(N,) step of the keyframes; None where the matrix is not positive definite."""
+    if not len(equations.gradient):
+        return equations.gradient
+    # An unknown that nothing touches stays where it is.
+    added = np.where(equations.diagonal > 0.0, damping * equations.diagonal, 1.0)
+    equations.hessian[np.diag_indices_from(equations.hessian)] += added
+    try:
+        # The upper triangle by rows is LAPACK's lower triangle by columns.
+        factor = cho_factor(equations.hessian.T, lower=True, overwrite_a=True, check_finite=False)
+    except LinAlgError:
+        return None
+    return -cho_solve(factor, equations.gradient, check_finite=False)
+
+
+def _last_covariance(
+    model: Model, linear: Linearization, free_slots: NDArray[np.int64]
+) -> NDArray[np.float64] | None:
+    """(6, 6) of position and rotation of the last free keyframe."""
+    if not len(free_slots):
+        return None
+    equations = model.normal_equations(linear, 0.0)
+    before = equations.diagonal
+    equations.hessian[np.diag_indices_from(equations.hessian)] += np.where(before > 0.0, 0.0, 1.0)
+    try:
+        lower, _ = cho_factor(equations.hessian.T, lower=True, overwrite_a=True, check_finite=False)
+    except LinAlgError:
+        return None
+    if (np.diag(lower) ** 2 < LEAST_PIVOT * before).any():
+        return None
+    unknowns = 6 * int(free_slots[-1]) + np.array([3, 4, 5, 0, 1, 2])
+    units = np.zeros((model.size, 6))
+    units[unknowns, range(6)] = 1.0
+    covariance = cho_solve((lower, True), units, check_finite=False)[unknowns]
+    return 0.5 * (covariance + covariance.T)
+
+
+def _estimate(states: States, points: NDArray[np.float64]) -> Estimate:
+    vectors = np.concatenate(
+        [states.positions, states.velocities, states.gyro_biases, states.accelerometer_biases],
+        axis=1,
+    )
+    return Estimate(states.rotations.copy(), vectors, points)
+
+
+def _states(estimate: Estimate, before: States) -> States:
+    positions, velocities, gyro, accelerometer = np.split(estimate.vectors, 4, axis=1)
+    return States(estimate.rotations, positions, velocities, gyro, accelerometer, before.still)
+
+
+def _residuals_px(
+    model: Model, estimate: Estimate, observations: Observations
+) -> NDArray[np.float64]:
+    """In the order the caller gave the observations in."""
+    positions = np.ascontiguousarray(estimate.vectors[:, 0:3])
+    poses = residuals.camera_poses(
+        estimate.rotations, positions, model.R_rig_camera, model.t_rig_camera
+    )
+    return residuals.reprojection_errors_px(
+        observations.keyframes,
+        observations.points,
+        observations.pixels,
+        *poses,
+        estimate.points,
+        model.camera,
+    )
