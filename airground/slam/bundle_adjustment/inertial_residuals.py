@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
+from numpy.typing import ArrayLike, NDArray
 
 from airground.slam import so3
 from airground.slam.bundle_adjustment.problem import InertialFactor
@@ -46,31 +45,40 @@ class PackedMotions:
 
 def pack(factors: Sequence[InertialFactor]) -> PackedMotions:
     """Lay factors out for the kernel."""
-    count = len(factors)
     motions = [factor.preintegration for factor in factors]
+    count = len(motions)
     by_biases = np.zeros((count, 9, 6))
+    by_biases[:, 0:3, 0:3] = _stack([m.rotation_by_gyro_bias for m in motions], 3, 3)
+    by_biases[:, 3:6, 0:3] = _stack([m.velocity_by_gyro_bias for m in motions], 3, 3)
+    by_biases[:, 3:6, 3:6] = _stack([m.velocity_by_accelerometer_bias for m in motions], 3, 3)
+    by_biases[:, 6:9, 0:3] = _stack([m.position_by_gyro_bias for m in motions], 3, 3)
+    by_biases[:, 6:9, 3:6] = _stack([m.position_by_accelerometer_bias for m in motions], 3, 3)
     whitening = np.zeros((count, 15, 15))
-    for n, motion in enumerate(motions):
-        by_biases[n, 0:3, 0:3] = motion.rotation_by_gyro_bias
-        by_biases[n, 3:6, 0:3] = motion.velocity_by_gyro_bias
-        by_biases[n, 3:6, 3:6] = motion.velocity_by_accelerometer_bias
-        by_biases[n, 6:9, 0:3] = motion.position_by_gyro_bias
-        by_biases[n, 6:9, 3:6] = motion.position_by_accelerometer_bias
-        lower = np.linalg.cholesky(motion.covariance)
-        whitening[n, :9, :9] = solve_triangular(lower, np.eye(9), lower=True)
-        walk = np.repeat([motion.gyro_bias_sigma, motion.accelerometer_bias_sigma], 3)
-        whitening[n, range(9, 15), range(9, 15)] = 1.0 / walk
-    biases = [np.concatenate([m.gyro_bias, m.accelerometer_bias]) for m in motions]
+    # L with covariance = L L': its inverse makes the covariance one.
+    lower = np.linalg.cholesky(_stack([m.covariance for m in motions], 9, 9))
+    whitening[:, :9, :9] = np.linalg.inv(lower)
+    walks = [(m.gyro_bias_sigma, m.accelerometer_bias_sigma) for m in motions]
+    whitening[:, range(9, 15), range(9, 15)] = np.repeat(1.0 / _stack(walks, 2), 3, axis=1)
     return PackedMotions(
         firsts=np.array([factor.first for factor in factors], np.int64),
-        durations=np.array([m.duration_s for m in motions], np.float64),
-        rotations=np.array([m.rotation for m in motions]).reshape(count, 3, 3),
-        velocities=np.array([m.velocity for m in motions]).reshape(count, 3),
-        positions=np.array([m.position for m in motions]).reshape(count, 3),
-        biases=np.array(biases).reshape(count, 6),
+        durations=_stack([m.duration_s for m in motions]),
+        rotations=_stack([m.rotation for m in motions], 3, 3),
+        velocities=_stack([m.velocity for m in motions], 3),
+        positions=_stack([m.position for m in motions], 3),
+        biases=np.hstack(
+            [
+                _stack([m.gyro_bias for m in motions], 3),
+                _stack([m.accelerometer_bias for m in motions], 3),
+            ]
+        ),
         by_biases=by_biases,
         whitening=whitening,
     )
+
+
+def _stack(rows: Sequence[ArrayLike], *shape: int) -> NDArray[np.float64]:
+    """(F, *shape), also where there are none."""
+    return np.array(rows, np.float64).reshape(len(rows), *shape)
 
 
 @njit(cache=True, error_model="numpy")

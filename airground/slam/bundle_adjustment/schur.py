@@ -6,7 +6,6 @@ Section 6.1, with the Jacobians factored as in `residuals`.
 
 from __future__ import annotations
 
-import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 

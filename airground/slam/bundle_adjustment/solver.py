@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg.lapack import dpotrf, dpotrs
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
@@ -72,7 +72,9 @@ def adjust(
     points = np.array(points, np.float64).reshape(-1, 3)
     check(states, roles, points, observations, inertial)
     slots = np.where(roles == Role.FIXED, -1, np.cumsum(roles != Role.FIXED) - 1)
-    motions = inertial_residuals.pack(inertial)
+    # Between two keyframes that stay, a motion says nothing.
+    telling = [f for f in inertial if max(slots[f.first], slots[f.second]) >= 0]
+    motions = inertial_residuals.pack(telling)
     seen = sort_observations(observations, slots, len(points))
     start = _estimate(states, points)
     model = Model(
@@ -128,17 +130,25 @@ def _descend(
 
 def _solve(equations: NormalEquations, damping: float) -> NDArray[np.float64] | None:
     """(N,) step of the keyframes; None where the matrix is not positive definite."""
-    if not len(equations.gradient):
-        return equations.gradient
+    lower = _factor(equations, damping)
+    return None if lower is None else -_back(lower, equations.gradient)
+
+
+def _factor(equations: NormalEquations, damping: float) -> NDArray[np.float64] | None:
+    """(N, N) Cholesky factor of the damped Hessian, which it overwrites; None without one."""
     # An unknown that nothing touches stays where it is.
     added = np.where(equations.diagonal > 0.0, damping * equations.diagonal, 1.0)
-    equations.hessian[np.diag_indices_from(equations.hessian)] += added
-    try:
-        # The upper triangle by rows is LAPACK's lower triangle by columns.
-        factor = cho_factor(equations.hessian.T, lower=True, overwrite_a=True, check_finite=False)
-    except LinAlgError:
-        return None
-    return -cho_solve(factor, equations.gradient, check_finite=False)
+    equations.hessian.ravel()[:: len(added) + 1] += added
+    if not len(added):
+        return equations.hessian
+    # The upper triangle by rows is LAPACK's lower triangle by columns.
+    lower, failed = dpotrf(equations.hessian.T, lower=1, overwrite_a=1, clean=0)
+    return None if failed else lower
+
+
+def _back(lower: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Solve with the factor."""
+    return dpotrs(lower, right, lower=1)[0] if len(right) else right
 
 
 def _last_covariance(
@@ -148,18 +158,15 @@ def _last_covariance(
     if not len(free_slots):
         return None
     equations = model.normal_equations(linear, 0.0)
-    before = equations.diagonal
-    equations.hessian[np.diag_indices_from(equations.hessian)] += np.where(before > 0.0, 0.0, 1.0)
-    try:
-        lower, _ = cho_factor(equations.hessian.T, lower=True, overwrite_a=True, check_finite=False)
-    except LinAlgError:
-        return None
-    if (np.diag(lower) ** 2 < LEAST_PIVOT * before).any():
-        return None
     unknowns = 6 * int(free_slots[-1]) + np.array([3, 4, 5, 0, 1, 2])
+    if not (equations.diagonal[unknowns] > 0.0).all():
+        return None
+    lower = _factor(equations, 0.0)
+    if lower is None or (np.diag(lower) ** 2 < LEAST_PIVOT * equations.diagonal).any():
+        return None
     units = np.zeros((model.size, 6))
     units[unknowns, range(6)] = 1.0
-    covariance = cho_solve((lower, True), units, check_finite=False)[unknowns]
+    covariance = _back(lower, units)[unknowns]
     return 0.5 * (covariance + covariance.T)
 
 

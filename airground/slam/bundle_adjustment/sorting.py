@@ -58,22 +58,23 @@ def _order(
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Two stable counting sorts, by slot and then by point, and where each point starts."""
     count = len(keyframes)
-    places = np.zeros(len(slot_of) + 2, np.int64)
-    for m in range(count):
-        places[slot_of[keyframes[m]] + 2] += 1
-    places = np.cumsum(places)
-    by_slot = np.empty(count, np.int64)
-    for m in range(count):
-        slot = slot_of[keyframes[m]] + 1
-        by_slot[places[slot]] = m
-        places[slot] += 1
-    starts = np.zeros(point_count + 1, np.int64)
-    for m in range(count):
-        starts[points[m] + 1] += 1
+    by_slot, _ = _counting_sort(slot_of[keyframes] + 1, len(slot_of) + 1, np.arange(count))
+    return _counting_sort(points, point_count, by_slot)
+
+
+@njit(cache=True, error_model="numpy")
+def _counting_sort(
+    keys: NDArray, key_count: int, order: NDArray
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """`order` sorted by the keys of what it names, and where each key starts (and the end)."""
+    starts = np.zeros(key_count + 1, np.int64)
+    for key in keys:
+        starts[key + 1] += 1
     starts = np.cumsum(starts)
-    places = starts.copy()
-    order = np.empty(count, np.int64)
-    for m in by_slot:
-        order[places[points[m]]] = m
-        places[points[m]] += 1
-    return order, starts
+    free = starts.copy()
+    sorted_order = np.empty(len(keys), np.int64)
+    for m in order:
+        key = keys[m]
+        sorted_order[free[key]] = m
+        free[key] += 1
+    return sorted_order, starts
