@@ -66,6 +66,19 @@ class FeatureTracker:
         self.failures[fitted] = 0
         self.keep(self.failures < patience)
 
+    def thin(self, cell_px: float) -> None:
+        """Keep one corner a cell of a grid, the one known longest.
+
+        Seen from higher up, corners crowd together and would leave no room for others.
+        """
+        columns, rows = np.floor(self.pixels / cell_px).astype(np.int64).T
+        by_age = np.argsort(self.ids, kind="stable")
+        cells = (rows * 10_000 + columns)[by_age]
+        _, first = np.unique(cells, return_index=True)
+        kept = np.zeros(len(self.ids), bool)
+        kept[by_age[first]] = True
+        self.keep(kept)
+
     def add(self, ids: NDArray[np.int64], pixels: NDArray) -> None:
         """Follow further corners of the newest image."""
         self.ids = np.concatenate([self.ids, ids])

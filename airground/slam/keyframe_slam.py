@@ -6,7 +6,7 @@ then an image becomes a keyframe and extends the map. How a map begins is in `st
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.slam.depth_lookup import inverse_depths_at
 from airground.slam.feature_tracker import FeatureTracker
+from airground.slam.frame import Frame
 from airground.slam.frame_pose import frame_pose
 from airground.slam.geometry.pose_estimation import PoseFit
 from airground.slam.local_mapping import LocalMapper, NewKeyframe
@@ -35,21 +36,6 @@ FIRST_GLOBAL_ADJUSTMENT = 24
 MAX_JUMP_M = 0.25
 """No robot here moves so far between prediction and measurement from image to image."""
 DEPTH_RANGE_PERCENT = 2.0
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """One image as the engine takes it.
-
-    Attributes:
-        stamp_ns: Of the image.
-        image: (height, width) grey.
-        depth: (height, width) [m], NaN where missing; None without a depth camera.
-    """
-
-    stamp_ns: int
-    image: NDArray[np.uint8]
-    depth: NDArray[np.float32] | None = None
 
 
 class KeyframeSlam:
@@ -184,6 +170,10 @@ class KeyframeSlam:
     def covariance(self, fit: PoseFit) -> NDArray[np.float64]:
         """(6, 6) of the newest pose: that of the image within the map, and of the map."""
         return fit.covariance + self._keyframe_covariance
+
+    def unseen_s(self) -> float:
+        """How long ago an image gave a pose [s]."""
+        return 0.0 if self.stamp_ns is None else (self.stamp_ns - self._seen_ns) * 1e-9
 
     def depth_range(self) -> tuple[float, float] | None:
         """Nearest and farthest map point in the newest image [m]."""

@@ -24,6 +24,8 @@ from airground.slam.sparse_map import CANDIDATE, Keyframe, SparseMap
 MAX_TRIANGULATION_ERROR_PX = 2.0
 MIN_REUSED = 12
 """Fewer old points than this found again could be chance."""
+CROWDED = 0.5
+"""Corners closer than this share of their spacing when chosen are too many."""
 REUSE_SEARCH_PX = 15.0
 """An old point farther than this from where it was expected is another."""
 
@@ -93,6 +95,7 @@ class LocalMapper:
         self._reuse(keyframe, new)
         covariance = self._adjuster.adjust_window(inertial)
         self._tracker.keep(~self._dropped(self._tracker.ids))
+        self._tracker.thin(CROWDED * self._parameters.corner_spacing_px)
         self._detect(keyframe, index, new)
         return covariance
 

@@ -71,6 +71,9 @@ class MapAdjuster:
             return None
         fixed = self._holding(free)
         roles = np.array([Role.FIXED] * len(fixed) + [Role.FREE] * len(free))
+        if inertial and first_free == 1:
+            # Tilt and biases of the beginning become known only by moving.
+            roles[0] = Role.GAUGE
         settings = Settings(iterations=self._parameters.iterations)
         return self._adjust(fixed + free, roles, inertial, settings)
 

@@ -8,7 +8,8 @@ from airground.config import Config
 from airground.core.messages import GroundImage, ImuSamples, RobotCalibration
 from airground.core.trajectory import Trajectory
 from airground.slam.front_end import TrackedPose, Tracking
-from airground.slam.keyframe_slam import Frame, KeyframeSlam
+from airground.slam.frame import Frame
+from airground.slam.keyframe_slam import KeyframeSlam
 from airground.slam.starts import level_start
 
 MIN_FIRST_POINTS = 40

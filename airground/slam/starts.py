@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 from airground.core.messages import RobotCalibration
 from airground.core.se3 import SE3
 from airground.slam.inertial.preintegration import GRAVITY
+from airground.slam.frame import Frame
+from airground.slam.inertial.stationarity import at_rest
 from airground.slam.motion_model import MotionModel
 from airground.slam.rig_state import RigState
 
+REST_WINDOW_NS = 400_000_000
 LEVEL_WINDOW_NS = 200_000_000
 MAX_OFF_GRAVITY = 0.5
 """Specific force may differ this much from gravity for its direction to be upwards [m/s^2]."""
@@ -48,3 +51,30 @@ def upright(up_rig: NDArray[np.float64], calibration: RobotCalibration) -> NDArr
 def centred(state: RigState, calibration: RobotCalibration) -> RigState:
     """`state`, shifted so that the camera is in the map's origin."""
     return replace(state, position=-state.rotation @ calibration.T_imu_camera.translation)
+
+
+class RestStart:
+    """Waits beside a robot at rest until it begins to move.
+
+    Args:
+        calibration: Of the robot.
+    """
+
+    def __init__(self, calibration: RobotCalibration) -> None:
+        self._calibration = calibration
+        self._last: tuple[Frame, RigState] | None = None
+
+    def observe(self, frame: Frame, motion: MotionModel) -> tuple[Frame, RigState] | None:
+        """Take in the next image; once the robot moved, the last image and state at rest."""
+        if motion.buffer is None:
+            return None
+        rest = at_rest(motion.buffer, frame.stamp_ns - REST_WINDOW_NS, frame.stamp_ns)
+        if rest is None:
+            last, self._last = self._last, None
+            return last
+        state = RigState.at_origin(upright(rest.specific_force, self._calibration))
+        excess = np.linalg.norm(rest.specific_force) - GRAVITY
+        bias = excess * rest.specific_force / np.linalg.norm(rest.specific_force)
+        state = replace(state, gyro_bias=rest.gyro, accelerometer_bias=bias)
+        self._last = frame, centred(state, self._calibration)
+        return None

@@ -1,0 +1,91 @@
+"""Monocular visual-inertial SLAM of the MAV (Sec. IV)."""
+
+from __future__ import annotations
+
+from airground.config import Config
+from airground.core.messages import ImuSamples, MavImage, RobotCalibration
+from airground.core.trajectory import Trajectory
+from airground.slam.front_end import ScaleEstimate, TrackedPose, Tracking
+from airground.slam.frame import Frame
+from airground.slam.keyframe_slam import KeyframeSlam
+from airground.slam.metric_scale import MetricScale
+from airground.slam.starts import RestStart, TwoViewStart
+
+MIN_TRACKED = 30
+"""Map points that must be seen before the first pose is given out."""
+MAX_UNSEEN_S = 3.5
+"""A map that was begun but shows too few points for so long is begun anew."""
+
+
+class MonocularSlam:
+    """A front end of the MAV.
+
+    From rest the map is metric at once: the accelerometer carries the robot through its
+    take-off until enough points are triangulated. In motion it begins with two views and
+    an unknown scale, and poses are given out when the scale is known.
+
+    Args:
+        calibration: What is known about the robot's sensors.
+        config: The whole pipeline's; the section `monocular_slam` is used.
+    """
+
+    def __init__(self, calibration: RobotCalibration, config: Config) -> None:
+        self._slam = KeyframeSlam(calibration, config.monocular_slam)
+        self._scale = MetricScale(self._slam, config.monocular_slam.scale)
+        self._rest = RestStart(calibration)
+        self._two_views = TwoViewStart(self._slam)
+        self._given_out = False
+
+    def add_imu(self, samples: ImuSamples) -> None:
+        """Take the inertial measurements up to the next image."""
+        self._slam.add_imu(samples)
+
+    def track(self, image: MavImage) -> TrackedPose:
+        """Where the camera was when `image` was taken."""
+        frame = Frame(image.stamp_ns, image.image)
+        slam = self._slam
+        if not slam.begun:
+            self._begin(frame)
+            return self._initializing(frame)
+        fit, corrected = slam.track(frame)
+        corrected |= self._scale.update(fit is not None)
+        if not self._given_out:
+            if slam.unseen_s() > MAX_UNSEEN_S:
+                slam.reset()
+            if fit is None or fit.inliers.sum() < MIN_TRACKED or not self._scale.known:
+                return self._initializing(frame)
+            self._given_out = True
+        if fit is None:
+            return TrackedPose(image.stamp_ns, Tracking.LOST, None, scale=self._scale.estimate)
+        slam.note(image.stamp_ns)
+        return TrackedPose(
+            image.stamp_ns,
+            Tracking.TRACKED,
+            slam.T_map_camera(),
+            slam.covariance(fit),
+            self._scale.estimate,
+            slam.depth_range(),
+            corrected,
+        )
+
+    def finish(self) -> None:
+        """Adjust the whole map."""
+        if self._slam.begun:
+            self._slam.adjust_all()
+
+    def trajectory(self) -> Trajectory | None:
+        """Every image tracked so far, at the pose that is believed now."""
+        return self._slam.trajectory()
+
+    def _begin(self, frame: Frame) -> None:
+        """Begin the map if the robot just left its place, or two views allow it."""
+        begin = self._rest.observe(frame, self._slam.motion)
+        if begin is not None:
+            self._slam.metric = self._slam.inertial = True
+            self._slam.begin(*begin, still=True)
+            self._slam.track(frame)
+
+    def _initializing(self, frame: Frame) -> TrackedPose:
+        return TrackedPose(
+            frame.stamp_ns, Tracking.INITIALIZING, None, scale=self._scale.estimate
+        )
