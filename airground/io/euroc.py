@@ -55,6 +55,7 @@ def read_image_list(path: Path) -> tuple[NDArray[np.int64], list[str]]:
     for number, line in enumerate(read_lines(path), start=1):
         if not line or line.startswith("#"):
             continue
+        _check_whole_stamp(line, number, path)
         try:
             stamp, name = line.split(",")
             stamps.append(int(stamp))
@@ -97,7 +98,10 @@ def _pose_yaml(pose: SE3) -> str:
 
 def _read_samples(path: Path, columns: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
     """(N,) stamps and (N, columns) values, all finite, in strict order of time."""
-    read_lines(path)  # a missing file gets its own message
+    for number, line in enumerate(read_lines(path), start=1):
+        if line and not line.startswith("#"):
+            _check_whole_stamp(line, number, path)
+            break
     dtype = np.dtype([("stamp", np.int64), ("values", np.float64, (columns,))])
     try:
         table = np.loadtxt(path, dtype=dtype, delimiter=",", comments="#", ndmin=1)
@@ -112,6 +116,16 @@ def _read_samples(path: Path, columns: int) -> tuple[NDArray[np.int64], NDArray[
         stamp = stamps[np.argmax(bad)]
         raise RecordingError(f"{path}: the sample at stamp {stamp} is not finite")
     return np.ascontiguousarray(stamps), np.ascontiguousarray(values)
+
+
+def _check_whole_stamp(line: str, number: int, path: Path) -> None:
+    """RecordingError if the line's stamp has decimals: it would be in seconds."""
+    stamp = line.partition(",")[0].strip()
+    if stamp.replace(".", "", 1).isdecimal() and not stamp.isdecimal():
+        raise RecordingError(
+            f"{path}:{number}: the stamp '{stamp}' has decimals, it looks like seconds; "
+            "expected whole nanoseconds"
+        )
 
 
 def _write_samples(path: Path, columns: str, stamps: NDArray, values: NDArray) -> None:

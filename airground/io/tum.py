@@ -17,6 +17,8 @@ from airground.errors import RecordingError
 from airground.io.euroc import check_stamps, read_lines
 
 SECOND_NS = 1_000_000_000
+LAST_SECOND = 9_000_000_000
+"""No clock shows more seconds than this; more nanoseconds would not fit 64 bits."""
 
 
 def format_stamp(stamp_ns: int) -> str:
@@ -28,11 +30,16 @@ def parse_stamp(text: str) -> int:
     """Nanoseconds from seconds such as '12', '12.5' or '1305031102.175304'; exact.
 
     Raises:
-        ValueError: The text is no plain decimal number with up to nine decimals.
+        ValueError: The text is no plain decimal number with up to nine decimals, or is
+            too large for seconds.
     """
     whole, _, decimals = text.partition(".")
     if not whole.isdecimal() or len(decimals) > 9 or (decimals and not decimals.isdecimal()):
         raise ValueError(f"'{text}' is no time in seconds with at most nine decimals")
+    if int(whole) > LAST_SECOND:
+        digits = len(whole)
+        unit = "milli" if digits < 15 else "micro" if digits < 18 else "nano"
+        raise ValueError(f"the time '{text}' looks like {unit}seconds; expected seconds")
     return int(whole) * SECOND_NS + int(decimals.ljust(9, "0"))
 
 
