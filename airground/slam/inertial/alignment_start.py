@@ -1,0 +1,121 @@
+"""A closed form for scale and gravity to begin with, from the shape of the inertial path.
+
+Camera centres in visual units are a linear function of one inertial path: of where it began,
+how fast, which way gravity pulled, what the accelerometer's bias added, and how many visual
+units a metre has. The visual error stands on the left side only, so that noisy centres do not
+draw the scale towards zero, as they do where accelerations are taken from them (as in Qin,
+Li and Shen, "VINS-Mono", T-RO 2018, Sec. V-B).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.slam import so3
+from airground.slam.inertial.alignment_kernel import Chain
+from airground.slam.inertial.preintegration import GRAVITY
+
+ROUNDS = 5
+"""Gravity's direction and the weight of the bias's prior settle in so many."""
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where to begin the search.
+
+    Attributes:
+        unit: Visual units in a metre; not positive where the fit failed.
+        unit_sigma: Its standard deviation, as a share.
+        gravity: (3,) in the axes of v [m/s^2].
+        velocities: (K, 3) of the rig [m/s].
+        gyro_bias, accelerometer_bias: (3,).
+    """
+
+    unit: float
+    unit_sigma: float
+    gravity: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    gyro_bias: NDArray[np.float64]
+    accelerometer_bias: NDArray[np.float64]
+
+
+def tangent_basis(direction: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3, 2) orthonormal vectors across `direction`."""
+    return np.linalg.svd(direction[None])[2][1:].T
+
+
+def gyro_bias_from_rotations(chain: Chain) -> NDArray[np.float64]:
+    """(3,) bias with which the gyro turns as the camera did, to first order."""
+    matrix, gradient = np.zeros((3, 3)), np.zeros(3)
+    for k, turn in enumerate(chain.turns):
+        jacobian = chain.jacobians[k, 0]
+        error = so3.log(turn.T @ chain.rotations[k].T @ chain.rotations[k + 1])
+        matrix += jacobian.T @ jacobian
+        gradient += jacobian.T @ error
+    prior = (chain.sigmas[0] / chain.sigmas[3]) ** 2 * np.eye(3)
+    bias = chain.gyro_biases[0]
+    return bias + np.linalg.solve(matrix + prior, gradient - prior @ bias)
+
+
+def closed_form(chain: Chain) -> Start:
+    """Gyro's bias from rotations, then everything else from the camera centres.
+
+    Args:
+        chain: Of keyframes that are all linked, at least four of them.
+    """
+    gyro_bias = gyro_bias_from_rotations(chain)
+    times = np.concatenate([[0.0], np.cumsum(chain.durations)])
+    speeds, path, speeds_by_bias, path_by_bias = _inertial_path(chain, gyro_bias)
+    path = path + chain.rotations @ chain.lever
+    gravity = -GRAVITY * speeds[-1] / np.linalg.norm(speeds[-1])
+    half_squares = 0.5 * times**2
+    unit, bias_sigma = 1.0, 0.0
+    for _ in range(ROUNDS):
+        tilts = -so3.hat(gravity) @ tangent_basis(gravity)
+        design = np.concatenate(
+            [
+                np.broadcast_to(np.eye(3), (len(times), 3, 3)),
+                times[:, None, None] * np.eye(3),
+                half_squares[:, None, None] * tilts,
+                path_by_bias,
+                (path + half_squares[:, None] * gravity)[:, :, None],
+            ],
+            axis=2,
+        )
+        rows = design.reshape(-1, 12) / chain.sigmas[1]
+        # The bias counts in visual units, as all of this; in the first round it is zero.
+        rows = np.concatenate([rows, np.eye(12)[8:11] / max(bias_sigma, 1e-9)])
+        right = np.concatenate([chain.centres.ravel() / chain.sigmas[1], np.zeros(3)])
+        fit = np.linalg.lstsq(rows, right, rcond=None)[0]
+        unit = float(fit[11])
+        if not unit > 0.0:
+            break
+        gravity = gravity + tilts @ fit[6:8] / unit
+        gravity *= GRAVITY / np.linalg.norm(gravity)
+        bias_sigma = chain.sigmas[4] * unit
+    covariance = np.linalg.pinv(rows.T @ rows)
+    bias = fit[8:11] / unit
+    velocities = fit[3:6] / unit + speeds + times[:, None] * gravity + speeds_by_bias @ bias
+    sigma = float(np.sqrt(covariance[11, 11])) / abs(unit)
+    return Start(unit, sigma, gravity, velocities, gyro_bias, chain.accelerometer_biases[0] + bias)
+
+
+def _inertial_path(
+    chain: Chain, gyro_bias: NDArray[np.float64]
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """(K, 3) velocity and position without gravity from rest, (K, 3, 3) each by the bias."""
+    count = len(chain.rotations)
+    velocity, position = np.zeros((count, 3)), np.zeros((count, 3))
+    velocity_by, position_by = np.zeros((count, 3, 3)), np.zeros((count, 3, 3))
+    for k, dt in enumerate(chain.durations):
+        R, J = chain.rotations[k], chain.jacobians[k]
+        shift = gyro_bias - chain.gyro_biases[k]
+        velocity[k + 1] = velocity[k] + R @ (chain.velocities[k] + J[1] @ shift)
+        moved = R @ (chain.positions[k] + J[3] @ shift)
+        position[k + 1] = position[k] + dt * velocity[k] + moved
+        velocity_by[k + 1] = velocity_by[k] + R @ J[2]
+        position_by[k + 1] = position_by[k] + dt * velocity_by[k] + R @ J[4]
+    return velocity, position, velocity_by, position_by
