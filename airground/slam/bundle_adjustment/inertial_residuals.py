@@ -18,6 +18,10 @@ from airground.slam import so3
 from airground.slam.bundle_adjustment.problem import InertialFactor
 from airground.slam.inertial.preintegration import GRAVITY_MAP
 
+INTEGRATION_NOISE = 1e-6
+"""Share by which every variance of a motion is raised: over a single step of integration
+velocity and position have the same noise, and their covariance alone would be singular."""
+
 
 @dataclass(frozen=True, eq=False)
 class PackedMotions:
@@ -55,7 +59,8 @@ def pack(factors: Sequence[InertialFactor]) -> PackedMotions:
     by_biases[:, 6:9, 3:6] = _stack([m.position_by_accelerometer_bias for m in motions], 3, 3)
     whitening = np.zeros((count, 15, 15))
     # L with covariance = L L': its inverse makes the covariance one.
-    lower = np.linalg.cholesky(_stack([m.covariance for m in motions], 9, 9))
+    covariances = _stack([m.covariance for m in motions], 9, 9)
+    lower = np.linalg.cholesky(covariances * (1.0 + INTEGRATION_NOISE * np.eye(9)))
     whitening[:, :9, :9] = np.linalg.inv(lower)
     walks = [(m.gyro_bias_sigma, m.accelerometer_bias_sigma) for m in motions]
     whitening[:, range(9, 15), range(9, 15)] = np.repeat(1.0 / _stack(walks, 2), 3, axis=1)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from airground.slam.bundle_adjustment.residuals import FASTMATH
 
-FLOOR = 1e-9
-"""Least damping of a point, as a share of the trace of its block: a ray's worth of
-information leaves the depth open, and this is as good as nothing for any other point."""
+FLOOR = 1e-10
+"""Least damping of a point, as a share of the trace of its block: a single ray, or rays that
+are all but parallel, leave the depth open, and to any other point this is as good as nothing."""
 
 
 @njit(cache=True, error_model="numpy", fastmath=FASTMATH)
@@ -142,6 +142,9 @@ def eliminate_points(
     """
     for j in range(len(starts) - 1):
         start, stop = starts[j], starts[j + 1]
+        # Wherever its one keyframe goes, the point can follow: it says nothing about poses.
+        if stop - start < 2:
+            continue
         # Sorted by slot: keyframes that do not move come first.
         first = start
         while first < stop and slots[first] < 0:

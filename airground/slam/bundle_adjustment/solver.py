@@ -33,8 +33,9 @@ FIRST_DAMPING = 1e-5
 """Windows start close to their optimum, where Gauss-Newton is best."""
 LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e4
 DAMPING_FACTOR = 10.0
-LEAST_PIVOT = 1e-10
-"""An unknown that keeps a smaller share of its information, given those before it, is open."""
+OPEN = 1e7
+"""A number whose variance is so many times what it were if all others were known is open: the
+scale of a map without IMU and depth, say, which only rounding and damping hold."""
 
 
 def adjust(
@@ -69,23 +70,8 @@ def adjust(
         ValueError: The parts of the problem do not fit together, or are not finite.
     """
     roles = np.asarray(roles, np.int64).reshape(len(states))
-    points = np.array(points, np.float64).reshape(-1, 3)
-    check(states, roles, points, observations, inertial)
-    slots = np.where(roles == Role.FIXED, -1, np.cumsum(roles != Role.FIXED) - 1)
-    # Between two keyframes that stay, a motion says nothing.
-    telling = [f for f in inertial if max(slots[f.first], slots[f.second]) >= 0]
-    motions = inertial_residuals.pack(telling)
-    seen = sort_observations(observations, slots, len(points))
-    start = _estimate(states, points)
-    model = Model(
-        seen,
-        motions,
-        prior_sharpness(states, roles, motions.firsts, settings),
-        slots,
-        camera,
-        T_rig_camera,
-        start,
-        settings.huber,
+    model, start = prepare(
+        states, roles, points, observations, inertial, camera, T_rig_camera, settings
     )
     best, linear, cost_before, iterations = _descend(model, start, settings)
     return Adjustment(
@@ -95,8 +81,39 @@ def adjust(
         cost_before,
         linear.cost,
         iterations,
-        _last_covariance(model, linear, slots[roles == Role.FREE]),
+        _last_covariance(model, linear, model.slots[roles == Role.FREE]),
     )
+
+
+def prepare(
+    states: States,
+    roles: NDArray[np.int64],
+    points: NDArray[np.float64],
+    observations: Observations,
+    inertial: Sequence[InertialFactor],
+    camera: PinholeCamera,
+    T_rig_camera: SE3,
+    settings: Settings,
+) -> tuple[Model, Estimate]:
+    """The arguments of `adjust`, checked and laid out for the kernels."""
+    points = np.array(points, np.float64).reshape(-1, 3)
+    check(states, roles, points, observations, inertial)
+    slots = np.where(roles == Role.FIXED, -1, np.cumsum(roles != Role.FIXED) - 1)
+    # Between two keyframes that stay, a motion says nothing.
+    telling = [f for f in inertial if max(slots[f.first], slots[f.second]) >= 0]
+    motions = inertial_residuals.pack(telling)
+    start = _estimate(states, points)
+    model = Model(
+        sort_observations(observations, slots, len(points)),
+        motions,
+        prior_sharpness(states, roles, motions.firsts, settings),
+        slots,
+        camera,
+        T_rig_camera,
+        start,
+        settings.huber,
+    )
+    return model, start
 
 
 def _descend(
@@ -162,11 +179,13 @@ def _last_covariance(
     if not (equations.diagonal[unknowns] > 0.0).all():
         return None
     lower = _factor(equations, 0.0)
-    if lower is None or (np.diag(lower) ** 2 < LEAST_PIVOT * equations.diagonal).any():
+    if lower is None:
         return None
     units = np.zeros((model.size, 6))
     units[unknowns, range(6)] = 1.0
     covariance = _back(lower, units)[unknowns]
+    if not (np.diag(covariance) * equations.diagonal[unknowns] < OPEN).all():
+        return None
     return 0.5 * (covariance + covariance.T)
 
 
