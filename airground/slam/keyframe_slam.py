@@ -20,19 +20,23 @@ from airground.slam.feature_tracker import FeatureTracker
 from airground.slam.frame import Frame
 from airground.slam.frame_pose import frame_pose
 from airground.slam.geometry.pose_estimation import PoseFit
+from airground.slam.inertial.alignment import InertialAlignment
 from airground.slam.local_mapping import LocalMapper, NewKeyframe
 from airground.slam.map_adjustment import MapAdjuster
 from airground.slam.recovery import Recovery
 from airground.slam.motion_model import MotionModel, Prediction
 from airground.slam.rig_state import RigState
 from airground.slam.sparse_map import SparseMap
+from airground.slam.starts import MovingStart
 
 PATIENCE = 2
 """A point that fits the pose badly in this many images in a row is given up."""
 MAX_COAST_S = 3.0
 """Inertial dead reckoning without a look at the scene drifts by centimetres in this time."""
-FIRST_GLOBAL_ADJUSTMENT = 24
-"""The whole map is adjusted at this many keyframes, and whenever their number doubles."""
+FIRST_GLOBAL_ADJUSTMENT = 8
+"""The whole map is adjusted at this many keyframes, and whenever it has grown by half: what
+the beginning got wrong shows only later, and would bend all that stands on it."""
+GLOBAL_ADJUSTMENT_GROWTH = 1.5
 MAX_JUMP_M = 0.25
 """No robot here moves so far between prediction and measurement from image to image."""
 DEPTH_RANGE_PERCENT = 2.0
@@ -115,6 +119,22 @@ class KeyframeSlam:
         self.state, self.stamp_ns, self._seen_ns = state, frame.stamp_ns, frame.stamp_ns
         self._insert(frame, still=still)
 
+    def begin_moving(self, start: MovingStart) -> None:
+        """Start the map with two views; its unit is the first one's median depth."""
+        self.tracker.clear()
+        self.tracker.advance(start.first.image, self.tracker.pixels)
+        ids = self.map.new_points(start.pixels_first, 0)
+        self.map.place(ids, start.points_map)
+        self.tracker.add(ids, start.pixels_first)
+        self.state, self.stamp_ns = start.first_state, start.first.stamp_ns
+        self._insert(start.first)
+        self.tracker.clear()
+        self.tracker.advance(start.second.image, self.tracker.pixels)
+        self.tracker.add(ids, start.pixels_second)
+        self.state, self.stamp_ns = start.second_state, start.second.stamp_ns
+        self._seen_ns = start.second.stamp_ns
+        self._insert(start.second)
+
     def track(self, frame: Frame) -> tuple[PoseFit | None, bool]:
         """Follow the map into the next image.
 
@@ -166,6 +186,22 @@ class KeyframeSlam:
             gyro_bias=newest.state.gyro_bias,
             accelerometer_bias=newest.state.accelerometer_bias,
         )
+
+    def make_metric(self, alignment: InertialAlignment) -> None:
+        """Scale the map and turn it upright; from now on the accelerometer counts."""
+        lever = self.T_rig_camera.translation
+        self.map.move(alignment.scale, alignment.R_map_v, lever)
+        newest = self.map.keyframes[-len(alignment.velocities) :]
+        for n, keyframe in enumerate(newest):
+            keyframe.state = replace(
+                keyframe.state,
+                velocity=alignment.velocities[n],
+                gyro_bias=alignment.gyro_biases[n],
+                accelerometer_bias=alignment.accelerometer_biases[n],
+            )
+        self.state = self.map.keyframes[-1].state
+        self.metric = self.inertial = True
+        self.adjust_all()
 
     def covariance(self, fit: PoseFit) -> NDArray[np.float64]:
         """(6, 6) of the newest pose: that of the image within the map, and of the map."""
@@ -312,6 +348,6 @@ class KeyframeSlam:
         self._recovery.add_keyframe()
         if len(self.map.keyframes) < self._next_global:
             return False
-        self._next_global *= 2
+        self._next_global = int(GLOBAL_ADJUSTMENT_GROWTH * self._next_global)
         self.adjust_all()
         return True

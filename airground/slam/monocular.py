@@ -9,7 +9,7 @@ from airground.slam.front_end import ScaleEstimate, TrackedPose, Tracking
 from airground.slam.frame import Frame
 from airground.slam.keyframe_slam import KeyframeSlam
 from airground.slam.metric_scale import MetricScale
-from airground.slam.starts import RestStart, TwoViewStart
+from airground.slam.starts import RestStart, TwoViewWait
 
 MIN_TRACKED = 30
 """Map points that must be seen before the first pose is given out."""
@@ -31,9 +31,9 @@ class MonocularSlam:
 
     def __init__(self, calibration: RobotCalibration, config: Config) -> None:
         self._slam = KeyframeSlam(calibration, config.monocular_slam)
-        self._scale = MetricScale(self._slam, config.monocular_slam.scale)
+        self._scale = MetricScale(self._slam)
         self._rest = RestStart(calibration)
-        self._two_views = TwoViewStart(self._slam)
+        self._two_views = TwoViewWait(calibration, config.monocular_slam)
         self._given_out = False
 
     def add_imu(self, samples: ImuSamples) -> None:
@@ -48,7 +48,7 @@ class MonocularSlam:
             self._begin(frame)
             return self._initializing(frame)
         fit, corrected = slam.track(frame)
-        corrected |= self._scale.update(fit is not None)
+        corrected |= self._scale.update()
         if not self._given_out:
             if slam.unseen_s() > MAX_UNSEEN_S:
                 slam.reset()
@@ -84,6 +84,10 @@ class MonocularSlam:
             self._slam.metric = self._slam.inertial = True
             self._slam.begin(*begin, still=True)
             self._slam.track(frame)
+            return
+        moving = self._two_views.observe(frame, self._slam.motion)
+        if moving is not None:
+            self._slam.begin_moving(moving)
 
     def _initializing(self, frame: Frame) -> TrackedPose:
         return TrackedPose(

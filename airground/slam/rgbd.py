@@ -69,8 +69,8 @@ class RgbdSlam:
 
     def _begin(self, frame: Frame) -> TrackedPose:
         slam = self._slam
-        state, at_rest = level_start(slam.motion, slam.calibration, frame.stamp_ns)
-        slam.begin(frame, state, still=at_rest)
+        state = level_start(slam.motion, slam.calibration, frame.stamp_ns)
+        slam.begin(frame, state, still=False)
         if slam.map.mapped(slam.tracker.ids).sum() < MIN_FIRST_POINTS:
             slam.reset()
             return TrackedPose(frame.stamp_ns, Tracking.INITIALIZING, None)

@@ -114,15 +114,20 @@ class SparseMap:
         wanted[ids] = True
         return np.array([int(wanted[keyframe.ids].sum()) for keyframe in self.keyframes])
 
-    def move(self, scale: float, rotation: NDArray, translation: NDArray) -> None:
-        """Move the whole map: x -> scale * rotation @ x + translation."""
+    def move(
+        self, scale: float, rotation: NDArray[np.float64], lever: NDArray[np.float64]
+    ) -> None:
+        """Scale and turn the whole map about its origin.
+
+        Args:
+            scale: Of all distances but that between rig and camera, which is known in metres.
+            rotation: (3, 3) after scaling.
+            lever: (3,) place of the camera in the rig.
+        """
         for keyframe in self.keyframes:
             state = keyframe.state
-            keyframe.state = replace(
-                state,
-                rotation=rotation @ state.rotation,
-                position=scale * rotation @ state.position + translation,
-                velocity=scale * rotation @ state.velocity,
-            )
+            turned = rotation @ state.rotation
+            camera = scale * rotation @ (state.position + state.rotation @ lever)
+            keyframe.state = replace(state, rotation=turned, position=camera - turned @ lever)
         n = self._count
-        self.positions[:n] = scale * self.positions[:n] @ rotation.T + translation
+        self.positions[:n] = scale * self.positions[:n] @ rotation.T

@@ -2,53 +2,52 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections import deque
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from airground.config import KeyframeSlam
 from airground.core.messages import RobotCalibration
-from airground.core.se3 import SE3
-from airground.slam.inertial.preintegration import GRAVITY
+from airground.slam.corners import detect_corners
+from airground.slam.feature_tracker import FeatureTracker
 from airground.slam.frame import Frame
-from airground.slam.inertial.stationarity import at_rest
+from airground.slam.geometry.two_view import TwoViewStart, start_from_two_views
+from airground.slam.inertial.preintegration import GRAVITY
+from airground.slam.inertial.stationarity import at_rest, gravity_aligned
 from airground.slam.motion_model import MotionModel
 from airground.slam.rig_state import RigState
 
-REST_WINDOW_NS = 400_000_000
+REST_WINDOW_NS = 500_000_000
+REST_FRAMES = 6
+"""A slow beginning hides in the noise at first: the map begins this many images earlier."""
+START_LEVELS = 3
+MIN_CORNERS = 60
+MIN_LEFT = 0.5
+"""With fewer of its corners left than this share, another first view is chosen."""
+GYRO_START_SIGMA = 0.01
+"""A gyro's unknown bias turns this far in a second [rad]."""
 LEVEL_WINDOW_NS = 200_000_000
 MAX_OFF_GRAVITY = 0.5
 """Specific force may differ this much from gravity for its direction to be upwards [m/s^2]."""
 
 
-def level_start(
-    motion: MotionModel, calibration: RobotCalibration, stamp_ns: int
-) -> tuple[RigState, bool]:
+def level_start(motion: MotionModel, calibration: RobotCalibration, stamp_ns: int) -> RigState:
     """The state in which a map begins: camera in the origin, its x axis along the map's.
 
     Up is where the accelerometer says; without one, where it is if the body stands level.
-
-    Returns:
-        The state, and whether it is known that the robot stands still.
     """
     up = calibration.T_body_imu.rotation.T[:, 2]
     if motion.buffer is not None:
         means = motion.buffer.mean_between(stamp_ns - LEVEL_WINDOW_NS, stamp_ns)
         if means is not None and abs(np.linalg.norm(means[1]) - GRAVITY) < MAX_OFF_GRAVITY:
             up = means[1]
-    return centred(RigState.at_origin(upright(up, calibration)), calibration), False
+    rotation = gravity_aligned(up, calibration.T_imu_camera.rotation[:, 0])
+    return _centred(RigState.at_origin(rotation), calibration)
 
 
-def upright(up_rig: NDArray[np.float64], calibration: RobotCalibration) -> NDArray[np.float64]:
-    """(3, 3) `R_map_rig` with z along `up_rig` and the camera's x axis over the map's."""
-    z = up_rig / np.linalg.norm(up_rig)
-    right = calibration.T_imu_camera.rotation[:, 0]
-    x = right - (right @ z) * z
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(z, x), z])
-
-
-def centred(state: RigState, calibration: RobotCalibration) -> RigState:
+def _centred(state: RigState, calibration: RobotCalibration) -> RigState:
     """`state`, shifted so that the camera is in the map's origin."""
     return replace(state, position=-state.rotation @ calibration.T_imu_camera.translation)
 
@@ -62,19 +61,132 @@ class RestStart:
 
     def __init__(self, calibration: RobotCalibration) -> None:
         self._calibration = calibration
-        self._last: tuple[Frame, RigState] | None = None
+        self._resting: deque[tuple[Frame, RigState]] = deque(maxlen=REST_FRAMES)
 
     def observe(self, frame: Frame, motion: MotionModel) -> tuple[Frame, RigState] | None:
-        """Take in the next image; once the robot moved, the last image and state at rest."""
-        if motion.buffer is None:
+        """Take in the next image; once the robot moved, an image and the state at rest."""
+        noise = self._calibration.imu
+        if motion.buffer is None or noise is None:
             return None
-        rest = at_rest(motion.buffer, frame.stamp_ns - REST_WINDOW_NS, frame.stamp_ns)
+        samples = motion.buffer.between(frame.stamp_ns - REST_WINDOW_NS, frame.stamp_ns)
+        rest = at_rest(samples, noise)
         if rest is None:
-            last, self._last = self._last, None
-            return last
-        state = RigState.at_origin(upright(rest.specific_force, self._calibration))
-        excess = np.linalg.norm(rest.specific_force) - GRAVITY
-        bias = excess * rest.specific_force / np.linalg.norm(rest.specific_force)
-        state = replace(state, gyro_bias=rest.gyro, accelerometer_bias=bias)
-        self._last = frame, centred(state, self._calibration)
+            began = self._resting[0] if self._resting else None
+            self._resting.clear()
+            return began
+        strength = float(np.linalg.norm(rest.specific_force))
+        rotation = gravity_aligned(
+            rest.specific_force, self._calibration.T_imu_camera.rotation[:, 0]
+        )
+        state = replace(
+            RigState.at_origin(rotation),
+            gyro_bias=rest.gyro,
+            accelerometer_bias=rest.specific_force * (1.0 - GRAVITY / strength),
+        )
+        self._resting.append((frame, _centred(state, self._calibration)))
         return None
+
+
+@dataclass(frozen=True, eq=False)
+class MovingStart:
+    """Two views of a robot in motion and the points that they share.
+
+    Attributes:
+        first, second: The images.
+        first_state, second_state: Of the rig; the map's unit is the first's median depth.
+        pixels_first, pixels_second: (n, 2) of the points.
+        points_map: (n, 3).
+    """
+
+    first: Frame
+    second: Frame
+    first_state: RigState
+    second_state: RigState
+    pixels_first: NDArray[np.float64]
+    pixels_second: NDArray[np.float64]
+    points_map: NDArray[np.float64]
+
+
+class TwoViewWait:
+    """Follows corners from one image until another sees enough of them from elsewhere.
+
+    Args:
+        calibration: Of the robot.
+        parameters: Of its SLAM.
+    """
+
+    def __init__(self, calibration: RobotCalibration, parameters: KeyframeSlam) -> None:
+        self._calibration, self._parameters = calibration, parameters
+        self._tracker = FeatureTracker(parameters.patch_px, START_LEVELS)
+        self._rng = np.random.default_rng(0)
+        self._first: Frame | None = None
+        self._corners = np.empty((0, 2), np.float32)
+
+    def observe(self, frame: Frame, motion: MotionModel) -> MovingStart | None:
+        """Take in the next image; the start, once there is one."""
+        self._tracker.advance(frame.image, self._tracker.pixels)
+        few = len(self._tracker.ids) < MIN_LEFT * max(len(self._corners), MIN_CORNERS)
+        if self._first is None or few:
+            self._restart(frame)
+            return None
+        before = self._corners[self._tracker.ids].astype(np.float64)
+        here = self._tracker.pixels.astype(np.float64)
+        camera = self._calibration.camera
+        R_rig = self._turn(motion, self._first, frame)
+        R = self._calibration.T_imu_camera.rotation
+        start = start_from_two_views(
+            before,
+            here,
+            camera,
+            self._rng,
+            R_a_b=None if R_rig is None else R.T @ R_rig @ R,
+            rotation_sigma=GYRO_START_SIGMA,
+            sigma_px=self._parameters.corner_sigma_px,
+        )
+        if not start.good or start.T_a_b is None:
+            return None
+        return self._made(self._first, frame, start, before, here, motion)
+
+    def _restart(self, frame: Frame) -> None:
+        self._tracker.clear()
+        self._tracker.advance(frame.image, self._tracker.pixels)
+        self._corners = detect_corners(
+            frame.image,
+            self._tracker.pixels,
+            self._parameters.corners,
+            self._parameters.corner_spacing_px,
+        )
+        self._tracker.add(np.arange(len(self._corners)), self._corners)
+        self._first = frame
+
+    def _turn(
+        self, motion: MotionModel, first: Frame, second: Frame
+    ) -> NDArray[np.float64] | None:
+        """(3, 3) turn of the rig between two images, by the gyro."""
+        moved = motion.preintegrate(first.stamp_ns, second.stamp_ns, RigState.at_origin())
+        return None if moved is None else moved.rotation
+
+    def _made(
+        self,
+        first: Frame,
+        second: Frame,
+        start: TwoViewStart,
+        before: NDArray[np.float64],
+        here: NDArray[np.float64],
+        motion: MotionModel,
+    ) -> MovingStart:
+        assert start.T_a_b is not None
+        state = level_start(motion, self._calibration, first.stamp_ns)
+        T_rig_camera = self._calibration.T_imu_camera
+        T_map_first = state.pose() @ T_rig_camera
+        T_map_second = T_map_first @ start.T_a_b @ T_rig_camera.inverse()
+        good = start.inliers
+        return MovingStart(
+            first,
+            second,
+            state,
+            state.posed(T_map_second),
+            before[good],
+            here[good],
+            T_map_first @ start.points_a[good],
+        )

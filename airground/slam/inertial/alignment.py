@@ -34,8 +34,8 @@ VELOCITY_SIGMA = 100.0
 """Prior of velocity: none, but the equations stay regular where a chain has one keyframe [m/s]."""
 MIN_KEYFRAMES = 4
 MAX_STEPS = 12
-SETTLED = 1e-4
-"""A step of scale (as a share) and of tilt [rad] below this is the last."""
+SETTLED = 0.02
+"""A step of scale and tilts below this share of their deviations is the last."""
 NOISE_FLOOR = np.diag([1e-6] * 3 + [1e-5] * 3 + [1e-6] * 3) ** 2
 """Added to every motion's covariance, so that perfect sensors have one [rad], [m/s], [m]."""
 WALK_FLOOR = 1e-6
@@ -62,13 +62,13 @@ class InertialAlignment:
     since the lever between them is in metres already.
 
     Attributes:
-        scale: Metres in a visual unit; NaN where no search could begin.
+        scale: Metres in a visual unit; NaN where the search failed.
         R_map_v: (3, 3), z up in the map.
         velocities: (K, 3) of the rig in the map [m/s].
         gyro_biases, accelerometer_biases: (K, 3) at each keyframe.
         scale_sigma: Standard deviation of the scale, as a share of it; infinite if unknown.
         tilt_sigma: Of gravity's direction, the worse of two [rad].
-        observable: Whether the motion shows the scale to 5 %.
+        observable: Whether the motion shows the scale to 5 %; without it, believe nothing here.
         rms: Of the weighted residuals by degree of freedom: 1 where the stated noise is the
             true one. Above 1 it is already in the sigmas.
     """
@@ -235,7 +235,7 @@ def _search(chain: Chain, state: _State) -> _Solution | None:
         state.vectors += step[:, 1:]
         state.log_scale += shared_step
         state.gravity = so3.exp(basis @ shared[1:]) @ state.gravity
-        settled = bool(np.abs(shared).max() < SETTLED)
+        settled = bool((np.abs(shared) < SETTLED * np.sqrt(np.diag(covariance))).all())
     return None
 
 
@@ -243,15 +243,16 @@ def _result(
     state: _State, R_map_v: NDArray[np.float64], solution: _Solution | None
 ) -> InertialAlignment:
     """The state in the map's axes, with honest deviations."""
-    scale_sigma, tilt_sigma, rms = np.inf, np.inf, np.nan
+    scale, scale_sigma, tilt_sigma, rms = np.nan, np.inf, np.inf, np.nan
     if solution is not None:
+        scale = float(np.exp(state.log_scale))
         variances = np.diag(solution.covariance)
         inflation = max(1.0, solution.rms)
         scale_sigma = inflation * float(np.sqrt(variances[0]))
         tilt_sigma = inflation * float(np.sqrt(variances[1:].max()))
         rms = solution.rms
     return InertialAlignment(
-        float(np.exp(state.log_scale)),
+        scale,
         R_map_v,
         state.vectors[:, 1] @ R_map_v.T,
         state.vectors[:, 2],
@@ -315,10 +316,10 @@ def _chain(
             motion.position_by_gyro_bias,
             motion.position_by_accelerometer_bias,
         )
-        root = np.linalg.cholesky(motion.covariance + NOISE_FLOOR)
-        chain.whitening[k] = np.linalg.inv(root)
+        chain.whitening[k] = motion.covariance
         chain.gyro_biases[k] = motion.gyro_bias
         chain.accelerometer_biases[k] = motion.accelerometer_bias
         chain.walks[k] = motion.gyro_bias_sigma, motion.accelerometer_bias_sigma
+    chain.whitening[:] = np.linalg.inv(np.linalg.cholesky(chain.whitening + NOISE_FLOOR))
     np.maximum(chain.walks, WALK_FLOOR, out=chain.walks)
     return chain

@@ -20,6 +20,8 @@ from airground.slam.inertial.preintegration import GRAVITY
 
 ROUNDS = 5
 """Gravity's direction and the weight of the bias's prior settle in so many."""
+PIECE_S = 4.0
+"""The path begins anew so often: until then the accelerometer's noise stays at centimetres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,50 +69,61 @@ def closed_form(chain: Chain) -> Start:
         chain: Of keyframes that are all linked, at least four of them.
     """
     gyro_bias = gyro_bias_from_rotations(chain)
-    times = np.concatenate([[0.0], np.cumsum(chain.durations)])
-    speeds, path, speeds_by_bias, path_by_bias = _inertial_path(chain, gyro_bias)
+    pieces, times = _pieces(chain.durations)
+    speeds, path, speeds_by_bias, path_by_bias = _inertial_path(chain, gyro_bias, pieces)
     path = path + chain.rotations @ chain.lever
-    gravity = -GRAVITY * speeds[-1] / np.linalg.norm(speeds[-1])
+    ends = np.flatnonzero(np.append(np.diff(pieces) > 0, True))
+    gravity = -speeds[ends].sum(axis=0)
+    gravity *= GRAVITY / np.linalg.norm(gravity)
     half_squares = 0.5 * times**2
+    # The columns: place and velocity where each piece begins, two tilts, the bias, the unit.
+    begun = np.eye(pieces[-1] + 1)[pieces]
+    begun = np.stack([begun, times[:, None] * begun], axis=1).reshape(len(times), -1)
+    own = np.einsum("kc,ij->kicj", begun, np.eye(3)).reshape(len(times), 3, -1)
+    n = own.shape[2]
     unit, bias_sigma = 1.0, 0.0
     for _ in range(ROUNDS):
         tilts = -so3.hat(gravity) @ tangent_basis(gravity)
-        design = np.concatenate(
-            [
-                np.broadcast_to(np.eye(3), (len(times), 3, 3)),
-                times[:, None, None] * np.eye(3),
-                half_squares[:, None, None] * tilts,
-                path_by_bias,
-                (path + half_squares[:, None] * gravity)[:, :, None],
-            ],
-            axis=2,
-        )
-        rows = design.reshape(-1, 12) / chain.sigmas[1]
+        fallen = half_squares[:, None] * gravity
+        shared = [half_squares[:, None, None] * tilts, path_by_bias, (path + fallen)[:, :, None]]
+        rows = np.concatenate([own, *shared], axis=2).reshape(-1, n + 6) / chain.sigmas[1]
         # The bias counts in visual units, as all of this; in the first round it is zero.
-        rows = np.concatenate([rows, np.eye(12)[8:11] / max(bias_sigma, 1e-9)])
+        rows = np.concatenate([rows, np.eye(n + 6)[n + 2 : n + 5] / max(bias_sigma, 1e-9)])
         right = np.concatenate([chain.centres.ravel() / chain.sigmas[1], np.zeros(3)])
         fit = np.linalg.lstsq(rows, right, rcond=None)[0]
-        unit = float(fit[11])
+        unit = float(fit[-1])
         if not unit > 0.0:
             break
-        gravity = gravity + tilts @ fit[6:8] / unit
+        gravity = gravity + tilts @ fit[n : n + 2] / unit
         gravity *= GRAVITY / np.linalg.norm(gravity)
         bias_sigma = chain.sigmas[4] * unit
-    covariance = np.linalg.pinv(rows.T @ rows)
-    bias = fit[8:11] / unit
-    velocities = fit[3:6] / unit + speeds + times[:, None] * gravity + speeds_by_bias @ bias
-    sigma = float(np.sqrt(covariance[11, 11])) / abs(unit)
+    sigma = float(np.sqrt(np.linalg.pinv(rows.T @ rows)[-1, -1])) / abs(unit)
+    bias = fit[n + 2 : n + 5] / unit
+    began = fit[:n].reshape(2, -1, 3)[1, pieces] / unit
+    velocities = began + speeds + times[:, None] * gravity + speeds_by_bias @ bias
     return Start(unit, sigma, gravity, velocities, gyro_bias, chain.accelerometer_biases[0] + bias)
 
 
+def _pieces(durations: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """(K,) number of the piece that each keyframe lies in, (K,) time since the piece began."""
+    times = np.concatenate([[0.0], np.cumsum(durations)])
+    count = max(1, round(times[-1] / PIECE_S))
+    pieces = np.minimum(times * count / times[-1], count - 1).astype(np.int64)
+    pieces = np.unique(pieces, return_inverse=True)[1]
+    return pieces, times - times[np.searchsorted(pieces, pieces)]
+
+
 def _inertial_path(
-    chain: Chain, gyro_bias: NDArray[np.float64]
+    chain: Chain, gyro_bias: NDArray[np.float64], pieces: NDArray[np.int64]
 ) -> tuple[NDArray, NDArray, NDArray, NDArray]:
-    """(K, 3) velocity and position without gravity from rest, (K, 3, 3) each by the bias."""
+    """(K, 3) velocity and position without gravity since each piece began at rest in the
+    origin, (K, 3, 3) each by the bias."""
     count = len(chain.rotations)
     velocity, position = np.zeros((count, 3)), np.zeros((count, 3))
     velocity_by, position_by = np.zeros((count, 3, 3)), np.zeros((count, 3, 3))
     for k, dt in enumerate(chain.durations):
+        if pieces[k + 1] > pieces[k]:
+            continue
         R, J = chain.rotations[k], chain.jacobians[k]
         shift = gyro_bias - chain.gyro_biases[k]
         velocity[k + 1] = velocity[k] + R @ (chain.velocities[k] + J[1] @ shift)

@@ -1,0 +1,96 @@
+"""RGB-D odometry from each frame to the one before, whoever aligns the two.
+
+No map, no keyframes, no correction: errors add up. What SLAM gains is the difference.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from airground.core.messages import GroundImage, ImuSamples, RobotCalibration
+from airground.core.se3 import SE3
+from airground.core.trajectory import Trajectory
+from airground.slam.baselines.level_start import LevelStart
+from airground.slam.baselines.pose_log import PoseLog
+from airground.slam.front_end import TrackedPose, Tracking
+
+MIN_DEPTH_SHARE = 0.05
+"""A frame with depth in fewer of its pixels cannot be aligned."""
+MIN_CONTRAST = 3.0
+"""Nor can one whose grey levels deviate less than this: the lens is covered, or it is dark."""
+MAX_SPEED_MPS = 3.0
+MAX_TURN_DPS = 360.0
+"""No robot here moves faster; an alignment that says so has failed."""
+MAX_GAP_S = 1.0
+"""After this time without an alignment the frames do not overlap: a bridge would be a guess."""
+
+
+class Aligner(Protocol):
+    """Finds how the camera moved between two frames."""
+
+    def align(self, previous: GroundImage, image: GroundImage) -> SE3 | None:
+        """`T_previous_image`, or None where it cannot be told."""
+
+
+class FrameToFrame:
+    """A front end for the ground robot that chains the motions between frames.
+
+    A frame that cannot be aligned is lost, and the next is aligned with the last that was
+    not, for up to a second; after that it stays lost, since it has no map to return to.
+
+    Args:
+        calibration: Of the robot.
+        aligner: Who aligns two frames.
+    """
+
+    def __init__(self, calibration: RobotCalibration, aligner: Aligner) -> None:
+        self._start = LevelStart(calibration)
+        self._aligner = aligner
+        self._previous: tuple[GroundImage, SE3] | None = None
+        self._log = PoseLog()
+
+    def add_imu(self, samples: ImuSamples) -> None:
+        """Only what comes before the first pose is of use: it tells what is up."""
+        if self._previous is None:
+            self._start.add_imu(samples)
+
+    def track(self, image: GroundImage) -> TrackedPose:
+        """The last pose and the motion since."""
+        if not _can_be_aligned(image):
+            lost = Tracking.INITIALIZING if self._previous is None else Tracking.LOST
+            return TrackedPose(image.stamp_ns, lost, None)
+        if self._previous is None:
+            T_map_camera = self._start.T_map_camera()
+        else:
+            previous, T_map_previous = self._previous
+            T_previous_image = self._motion(previous, image)
+            if T_previous_image is None:
+                return TrackedPose(image.stamp_ns, Tracking.LOST, None)
+            T_map_camera = T_map_previous @ T_previous_image
+        self._previous = image, T_map_camera
+        return self._log.tracked(image.stamp_ns, T_map_camera)
+
+    def finish(self) -> None:
+        """Nothing was put off."""
+
+    def trajectory(self) -> Trajectory | None:
+        """The poses as they were returned."""
+        return self._log.trajectory()
+
+    def _motion(self, previous: GroundImage, image: GroundImage) -> SE3 | None:
+        duration_s = (image.stamp_ns - previous.stamp_ns) / 1e9
+        if duration_s > MAX_GAP_S:
+            return None
+        motion = self._aligner.align(previous, image)
+        if motion is None:
+            return None
+        too_far = np.linalg.norm(motion.translation) > MAX_SPEED_MPS * duration_s
+        too_much = np.rad2deg(motion.angle()) > MAX_TURN_DPS * duration_s
+        return None if too_far or too_much else motion
+
+
+def _can_be_aligned(image: GroundImage) -> bool:
+    contrast = float(image.colour[::4, ::4, 1].std())
+    return contrast >= MIN_CONTRAST and bool(np.isfinite(image.depth).mean() >= MIN_DEPTH_SHARE)

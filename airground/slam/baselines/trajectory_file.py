@@ -1,0 +1,54 @@
+"""Poses of any external system, from a TUM file that somebody has read."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from airground.core.messages import GroundImage, ImuSamples, MavImage
+from airground.core.trajectory import Trajectory
+from airground.slam.baselines.pose_log import PoseLog
+from airground.slam.front_end import TrackedPose, Tracking
+
+
+class TrajectoryFile:
+    """A front end that looks poses up.
+
+    A stamp between two poses that are at most 1.5 usual steps apart is interpolated; one
+    outside, or in a longer gap, takes the nearest pose if that is within half a step, and
+    is lost otherwise. The file's own frame is the map: it must be metric with z up, and its
+    poses those of the camera.
+
+    Args:
+        trajectory: The poses `T_map_camera`.
+    """
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        self._trajectory = trajectory
+        steps = np.diff(trajectory.stamps_ns)
+        self._step_ns = float(np.median(steps)) if len(steps) else 0.0
+        self._log = PoseLog()
+
+    def add_imu(self, samples: ImuSamples) -> None:
+        """The poses are known already."""
+
+    def track(self, image: MavImage | GroundImage) -> TrackedPose:
+        """The pose at the image's stamp."""
+        stamps, stamp = self._trajectory.stamps_ns, image.stamp_ns
+        after = int(np.searchsorted(stamps, stamp))
+        before = max(after - 1, 0)
+        after = min(after, len(stamps) - 1)
+        inside = stamps[before] <= stamp <= stamps[after]
+        if inside and stamps[after] - stamps[before] <= 1.5 * self._step_ns:
+            return self._log.tracked(stamp, self._trajectory.at(stamp))
+        nearest = min((before, after), key=lambda index: abs(int(stamps[index]) - stamp))
+        if abs(int(stamps[nearest]) - stamp) <= self._step_ns / 2:
+            return self._log.tracked(stamp, self._trajectory[nearest])
+        lost = Tracking.LOST if self._log.trajectory() else Tracking.INITIALIZING
+        return TrackedPose(stamp, lost, None)
+
+    def finish(self) -> None:
+        """Nothing was put off."""
+
+    def trajectory(self) -> Trajectory | None:
+        """The poses as they were returned."""
+        return self._log.trajectory()

@@ -1,0 +1,75 @@
+"""The front ends by name: a literal table for each robot.
+
+To add one, write a class that fulfils `front_end.FrontEnd` and put a line here; the
+contract test (`tests/slam/test_front_ends.py`) then runs it too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from airground.config import Config
+from airground.core.messages import GroundImage, MavImage, RobotCalibration
+from airground.core.trajectory import Trajectory
+from airground.errors import InputError
+from airground.slam.baselines.open3d_odometry import open3d_odometry
+from airground.slam.baselines.opencv_odometry import opencv_odometry
+from airground.slam.baselines.trajectory_file import TrajectoryFile
+from airground.slam.front_end import FrontEnd
+from airground.slam.rgbd import RgbdSlam
+
+
+@dataclass(frozen=True)
+class Ingredients:
+    """What a front end may be made of.
+
+    Attributes:
+        calibration: Of the robot.
+        config: The whole pipeline's.
+        trajectory: Poses `T_map_camera` of an external system; None where there are none.
+    """
+
+    calibration: RobotCalibration
+    config: Config
+    trajectory: Trajectory | None = None
+
+    def given_trajectory(self) -> Trajectory:
+        """The trajectory.
+
+        Raises:
+            InputError: There is none.
+        """
+        if self.trajectory is None:
+            raise InputError("the front end 'file' needs the trajectory that it shall follow")
+        return self.trajectory
+
+
+MAV: dict[str, Callable[[Ingredients], FrontEnd[MavImage]]] = {
+    "file": lambda given: TrajectoryFile(given.given_trajectory()),
+}
+"""Of the MAV: grey images and IMU."""
+
+GROUND: dict[str, Callable[[Ingredients], FrontEnd[GroundImage]]] = {
+    "slam": lambda given: RgbdSlam(given.calibration, given.config),
+    "open3d": lambda given: open3d_odometry(given.calibration),
+    "opencv": lambda given: opencv_odometry(given.calibration),
+    "file": lambda given: TrajectoryFile(given.given_trajectory()),
+}
+"""Of the ground robot: colour and depth."""
+
+Image = TypeVar("Image", MavImage, GroundImage)
+
+
+def make_front_end(
+    table: dict[str, Callable[[Ingredients], FrontEnd[Image]]], name: str, given: Ingredients
+) -> FrontEnd[Image]:
+    """The front end called `name`.
+
+    Raises:
+        InputError: The table has none of that name, or an ingredient is missing.
+    """
+    if name not in table:
+        raise InputError(f"--front-end {name}: unknown; known: {', '.join(table)}")
+    return table[name](given)

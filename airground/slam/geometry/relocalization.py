@@ -1,0 +1,184 @@
+"""Recognizing a place, from keyframes' map points alone: while lost, and to close loops."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.arrays import read_only
+from airground.core.camera import PinholeCamera
+from airground.core.se3 import SE3, nearest_rotation
+from airground.slam.corners import detect_corners
+from airground.slam.geometry.descriptors import Described, describe, match, votes
+from airground.slam.geometry.pose_estimation import PoseFit, estimate_pose
+
+CORNERS = 800
+CORNER_SPACING_PX = 12
+VOTERS = 150
+"""Corners that choose the keyframes to look at more closely."""
+CANDIDATES = 5
+MIN_INLIERS = 20
+MIN_INLIER_SHARE = 0.3
+MIN_HULL_SHARE = 0.05
+"""Inliers must span this share of the image: a small object may have moved, or have a twin."""
+PNP_ROUNDS = 300
+PNP_THRESHOLD_PX = 5.0
+SIGMA_PX = 1.5
+"""A corner found anew lies this far from the one that was followed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Matches:
+    """Map points recognized in an image.
+
+    Attributes:
+        point_ids: (n,) int64.
+        pixels: (n, 2) where they are in the image, good to 1 to 2 px.
+    """
+
+    point_ids: NDArray[np.int64]
+    pixels: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        point_ids = read_only(self.point_ids, "point_ids", (None,), np.int64)
+        object.__setattr__(self, "point_ids", point_ids)
+        pixels = read_only(self.pixels, "pixels", (len(point_ids), 2), np.float64)
+        object.__setattr__(self, "pixels", pixels)
+
+
+@dataclass(frozen=True, eq=False)
+class Relocalization:
+    """Where an image was taken.
+
+    Attributes:
+        keyframe_id: The keyframe that it was recognized by.
+        fit: The pose in the map; `fit.inliers` are over `matches`.
+        matches: Map points of the keyframe in the image.
+    """
+
+    keyframe_id: int
+    fit: PoseFit
+    matches: Matches
+
+
+class KeyframeIndex:
+    """What map points look like in each keyframe: 32 bytes a point, no vocabulary."""
+
+    def __init__(self) -> None:
+        self._point_ids: dict[int, NDArray[np.int64]] = {}
+        self._descriptors: dict[int, NDArray[np.uint64]] = {}
+
+    def __len__(self) -> int:
+        return len(self._point_ids)
+
+    def add(
+        self,
+        keyframe_id: int,
+        image: NDArray[np.uint8],
+        point_ids: NDArray[np.int64],
+        pixels: NDArray,
+    ) -> None:
+        """Remember a keyframe; one added before under the same number is replaced.
+
+        Args:
+            keyframe_id: Its number.
+            image: (height, width) grey.
+            point_ids: (n,) the map points in it.
+            pixels: (n, 2) where they are.
+        """
+        self._point_ids[keyframe_id] = np.array(point_ids, np.int64)
+        self._descriptors[keyframe_id] = describe(image, pixels).descriptors
+
+    def alike(self, query: Described, among: list[int] | None = None) -> list[int]:
+        """The keyframes most like an image, best first.
+
+        Args:
+            query: The image's corners, strongest first.
+            among: Keyframes to choose from; all by default.
+        """
+        ids = list(self._point_ids) if among is None else among
+        if not ids:
+            return []
+        groups = [self._descriptors[k] for k in ids]
+        starts = np.concatenate([[0], np.cumsum([len(group) for group in groups])])
+        counts = votes(query.descriptors[:VOTERS], np.concatenate(groups), starts)
+        return [ids[i] for i in np.argsort(-counts, kind="stable")[:CANDIDATES]]
+
+    def match(self, query: Described, keyframe_id: int) -> Matches:
+        """The keyframe's map points among an image's corners, some of them wrong."""
+        rows, partners = match(query.descriptors, self._descriptors[keyframe_id])
+        return Matches(self._point_ids[keyframe_id][partners], query.pixels[rows])
+
+    def find(
+        self,
+        image: NDArray[np.uint8],
+        camera: PinholeCamera,
+        points: Callable[[NDArray[np.int64]], NDArray[np.float64]],
+        among: list[int] | None = None,
+    ) -> Relocalization | None:
+        """Where an image was taken; None where no keyframe tells beyond doubt.
+
+        Args:
+            image: (height, width) grey.
+            camera: That took it.
+            points: Positions (n, 3) in the map of point numbers (n,), NaN if not mapped.
+            among: Keyframes to look at; all by default.
+        """
+        query = describe_corners(image)
+        found: list[Relocalization] = []
+        for keyframe_id in self.alike(query, among):
+            matches = self.match(query, keyframe_id)
+            positions = points(matches.point_ids)
+            mapped = np.isfinite(positions).all(axis=1)
+            matches = Matches(matches.point_ids[mapped], matches.pixels[mapped])
+            fit = pose_from_matches(positions[mapped], matches.pixels, camera)
+            if fit is not None:
+                found.append(Relocalization(keyframe_id, fit, matches))
+        return max(found, key=lambda place: int(place.fit.inliers.sum()), default=None)
+
+
+def describe_corners(image: NDArray[np.uint8]) -> Described:
+    """Corners of an image, strongest first, with their descriptors."""
+    nothing = np.empty((0, 2), np.float32)
+    return describe(image, detect_corners(image, nothing, CORNERS, CORNER_SPACING_PX))
+
+
+def pose_from_matches(
+    points_map: NDArray[np.float64], pixels: NDArray[np.float64], camera: PinholeCamera
+) -> PoseFit | None:
+    """The pose that enough matches agree on, over enough of the image; None without one.
+
+    Args:
+        points_map: (n, 3) map points [m].
+        pixels: (n, 2) where they were recognized, partly wrongly.
+        camera: Of the image.
+    """
+    if len(points_map) < MIN_INLIERS:
+        return None
+    # OpenCV starts RANSAC's generator anew in every call: the same input, the same pose.
+    found, turn, shift, rows = cv2.solvePnPRansac(
+        points_map,
+        pixels,
+        camera.matrix(),
+        None,
+        iterationsCount=PNP_ROUNDS,
+        reprojectionError=PNP_THRESHOLD_PX,
+        confidence=0.999,
+        flags=cv2.SOLVEPNP_AP3P,
+    )
+    if not found or rows is None or len(rows) < MIN_INLIERS:
+        return None
+    rotation = nearest_rotation(cv2.Rodrigues(turn)[0])
+    start = SE3(rotation, np.asarray(shift, np.float64).ravel()).inverse()
+    fit = estimate_pose(points_map, pixels, np.full(len(pixels), SIGMA_PX), camera, start)
+    share = fit.inliers.mean()
+    if fit.inliers.sum() < MIN_INLIERS or share < MIN_INLIER_SHARE:
+        return None
+    hull = cv2.convexHull(pixels[fit.inliers].astype(np.float32))
+    if cv2.contourArea(hull) < MIN_HULL_SHARE * camera.width * camera.height:
+        return None
+    return fit

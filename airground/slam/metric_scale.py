@@ -1,0 +1,92 @@
+"""Metric scale and the vertical of a monocular map, by its IMU (Sec. IV)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from airground.slam.front_end import ScaleEstimate
+from airground.slam.inertial.alignment import InertialAlignment, VisualNoise, align, refine_scale
+from airground.slam.inertial.preintegration import Preintegration
+from airground.slam.keyframe_slam import KeyframeSlam
+
+MIN_KEYFRAMES = 6
+MIN_SECONDS = 1.5
+"""Less is no motion to measure a scale by."""
+MAX_KEYFRAMES = 60
+"""A scale is searched over this many of the newest keyframes."""
+GIVE_OUT_SIGMA = 0.02
+"""Poses are given out when the scale is known this well [share] ..."""
+GIVE_OUT_TILT = np.deg2rad(0.5)
+"""... and the vertical this well [rad]."""
+POSE_SIGMA_PX = 0.3
+"""Noise of a keyframe's place, as its points would see it [px]."""
+
+
+class MetricScale:
+    """Tightly coupled: inertial factors in bundle adjustment hold the scale.
+
+    A map that began at rest is metric from the start, and only has to tell how well it knows
+    its scale. One that began in motion is scaled and turned upright once both are known.
+
+    Args:
+        slam: Whose map; changed in place.
+
+    Attributes:
+        estimate: How well the scale is known; None before there was anything to judge by.
+        known: Whether poses may be given out.
+    """
+
+    def __init__(self, slam: KeyframeSlam) -> None:
+        self.estimate: ScaleEstimate | None = None
+        # Without an IMU nobody will ever know: the unit is the scene's median depth.
+        self.known = slam.calibration.imu is None
+        self._slam = slam
+        self._judged = 0
+
+    def update(self) -> bool:
+        """Look at new keyframes; returns whether the map was moved."""
+        slam = self._slam
+        count = len(slam.map.keyframes)
+        if slam.motion.buffer is None:
+            self.estimate = ScaleEstimate(np.inf, observable=False)
+            return False
+        fresh = count > self._judged and (not self.known or count >= 1.5 * self._judged)
+        keyframes = slam.map.keyframes
+        seconds = (keyframes[-1].stamp_ns - keyframes[0].stamp_ns) * 1e-9
+        if not fresh or count < MIN_KEYFRAMES or seconds < MIN_SECONDS:
+            return False
+        self._judged = count
+        alignment = self._alignment()
+        if alignment is None:
+            return False
+        self.estimate = ScaleEstimate(alignment.scale_sigma, alignment.observable)
+        ready = alignment.scale_sigma < GIVE_OUT_SIGMA and alignment.tilt_sigma < GIVE_OUT_TILT
+        self.known = self.known or ready
+        if slam.inertial or not ready:
+            return False
+        slam.make_metric(alignment)
+        return True
+
+    def _alignment(self) -> InertialAlignment | None:
+        """Scale and vertical by the newest keyframes with nothing missing between them."""
+        slam = self._slam
+        count = len(slam.map.keyframes)
+        chosen = range(max(0, count - MAX_KEYFRAMES), count)
+        motions: list[Preintegration | None] = [slam.adjuster.motions.get(k) for k in chosen[1:]]
+        states = [slam.map.keyframes[k].state for k in chosen]
+        rotations = np.array([state.rotation for state in states])
+        centres = np.array(
+            [state.position + state.rotation @ slam.T_rig_camera.translation for state in states]
+        )
+        noise = VisualNoise(self._pose_sigma())
+        if slam.inertial:
+            return refine_scale(rotations, centres, slam.T_rig_camera, motions, noise)
+        known: list[Preintegration] = [motion for motion in motions if motion is not None]
+        if len(known) < len(motions):
+            return None
+        return align(rotations, centres, slam.T_rig_camera, known, noise)
+
+    def _pose_sigma(self) -> float:
+        """Noise of a keyframe's place, in the map's unit."""
+        depths = self._slam.depth_range()
+        return POSE_SIGMA_PX / self._slam.camera.fx * (depths[1] if depths else 1.0)
