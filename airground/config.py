@@ -149,6 +149,10 @@ class GroundMapping(Section):
     """The distance field ends this far from the surface [m]."""
     min_keyframes: Count = 3
     """A surface that fewer keyframes saw is noise."""
+    follow_distance_m: Positive = 0.005
+    """The map is fused anew once SLAM moved one of its keyframes this far [m] ..."""
+    follow_angle_deg: Positive = 0.2
+    """... or turned it this much [deg]."""
 
 
 class HeightMaps(Section):

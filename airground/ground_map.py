@@ -3,19 +3,24 @@
 Keyframes are fused in a truncated signed distance field, which averages the sensor's noise
 along its rays. Averaging points in cubes does not: at 4 m the noise of structured light is
 wider than a cube, and the highest of scattered points would enter the height map.
+
+When SLAM corrects poses, the map follows: keyframes are kept, and fused anew where they moved.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import open3d as o3d
-from numpy.typing import NDArray
 
 from airground.config import GroundMapping
 from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
 from airground.core.messages import GroundImage
 from airground.core.se3 import SE3
+from airground.core.trajectory import Trajectory
+from airground.ground_keyframe import GroundKeyframe
 
 _BLOCK = 8
 _FIRST_BLOCKS = 10_000
@@ -30,50 +35,90 @@ class GroundMap:
     """
 
     def __init__(self, camera: PinholeCamera, config: GroundMapping) -> None:
-        self.keyframes = 0
         self._config = config
         self._intrinsics = o3d.core.Tensor.from_numpy(camera.matrix())
-        self._grid = o3d.t.geometry.VoxelBlockGrid(
-            attr_names=("tsdf", "weight", "color"),
-            attr_dtypes=(o3d.core.float32,) * 3,
-            attr_channels=[o3d.core.SizeVector([n]) for n in (1, 1, 3)],
-            voxel_size=config.voxel_m,
-            block_resolution=_BLOCK,
-            block_count=_FIRST_BLOCKS,
-        )
-        self._T_ground_keyframe: SE3 | None = None
+        self._keyframes: list[GroundKeyframe] = []
+        self._grid = self._empty_grid()
+        self._fused = 0
         self._cloud: PointCloud | None = None
+
+    @property
+    def keyframes(self) -> int:
+        """How many there are."""
+        return len(self._keyframes)
 
     def wants(self, T_ground_camera: SE3) -> bool:
         """Whether the camera moved or turned enough since the last keyframe."""
-        if self._T_ground_keyframe is None:
+        if not self._keyframes:
             return True
-        motion = self._T_ground_keyframe.inverse() @ T_ground_camera
-        return (
-            float(np.linalg.norm(motion.translation)) >= self._config.keyframe_distance_m
-            or np.rad2deg(motion.angle()) >= self._config.keyframe_angle_deg
+        return _moved(
+            self._keyframes[-1].T_ground_camera,
+            T_ground_camera,
+            self._config.keyframe_distance_m,
+            self._config.keyframe_angle_deg,
         )
 
     def add(self, image: GroundImage, T_ground_camera: SE3) -> None:
         """Take in a keyframe."""
-        usable = np.where(_near_silhouette(image.depth), np.nan, image.depth)
-        depth = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(np.nan_to_num(usable)))
-        colour = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(image.colour.astype(np.float32)))
-        T_camera_ground = o3d.core.Tensor.from_numpy(T_ground_camera.inverse().matrix())
-        reach = (1.0, self._config.max_depth_m, self._config.truncation_m / self._config.voxel_m)
-        blocks = self._grid.compute_unique_block_coordinates(
-            depth, self._intrinsics, T_camera_ground, *reach
-        )
-        self._grid.integrate(blocks, depth, colour, self._intrinsics, T_camera_ground, *reach)
-        self._T_ground_keyframe = T_ground_camera
-        self.keyframes += 1
+        keyframe = GroundKeyframe.pack(image, T_ground_camera, self._config.max_depth_m)
+        self._keyframes.append(keyframe)
         self._cloud = None
+        if self._fused == len(self._keyframes) - 1:
+            self._fuse(keyframe)
+
+    def follow(self, trajectory: Trajectory) -> bool:
+        """Move the keyframes to where a corrected trajectory has them.
+
+        Args:
+            trajectory: `T_ground_camera` of the images tracked so far, by their stamps;
+                keyframes that it does not hold stay where they are.
+
+        Returns:
+            Whether one moved by more than the bounds of the configuration, so that the map
+            is fused anew when it is next asked for.
+        """
+        corrected = [_corrected(keyframe, trajectory) for keyframe in self._keyframes]
+        distance, angle = self._config.follow_distance_m, self._config.follow_angle_deg
+        if not any(
+            _moved(old.T_ground_camera, new.T_ground_camera, distance, angle)
+            for old, new in zip(self._keyframes, corrected, strict=True)
+        ):
+            return False
+        self._keyframes = corrected
+        self._grid, self._fused, self._cloud = self._empty_grid(), 0, None
+        return True
 
     def cloud(self) -> PointCloud:
         """The surface so far, with normals, in the frame `ground`."""
         if self._cloud is None:
+            for keyframe in self._keyframes[self._fused :]:
+                self._fuse(keyframe)
             self._cloud = self._extracted()
         return self._cloud
+
+    def _empty_grid(self) -> o3d.t.geometry.VoxelBlockGrid:
+        return o3d.t.geometry.VoxelBlockGrid(
+            attr_names=("tsdf", "weight", "color"),
+            attr_dtypes=(o3d.core.float32,) * 3,
+            attr_channels=[o3d.core.SizeVector([n]) for n in (1, 1, 3)],
+            voxel_size=self._config.voxel_m,
+            block_resolution=_BLOCK,
+            block_count=_FIRST_BLOCKS,
+        )
+
+    def _fuse(self, keyframe: GroundKeyframe) -> None:
+        """Put a keyframe into the distance field."""
+        depth = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(keyframe.depth()))
+        colours = keyframe.colour().astype(np.float32)
+        colour = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(colours))
+        T_camera_ground = o3d.core.Tensor.from_numpy(keyframe.T_ground_camera.inverse().matrix())
+        config = self._config
+        reach = (1.0, config.max_depth_m, config.truncation_m / config.voxel_m)
+        blocks = self._grid.compute_unique_block_coordinates(
+            depth, self._intrinsics, T_camera_ground, *reach
+        )
+        self._grid.integrate(blocks, depth, colour, self._intrinsics, T_camera_ground, *reach)
+        self._fused += 1
 
     def _extracted(self) -> PointCloud:
         if self.keyframes == 0:
@@ -90,13 +135,18 @@ class GroundMap:
         )
 
 
-def _near_silhouette(depth: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Pixels beside a jump in depth: there the sensor mixes fore- and background."""
-    jump = np.zeros(depth.shape, bool)
-    across = np.abs(np.diff(depth, axis=1)) > 0.05 * depth[:, 1:]
-    down = np.abs(np.diff(depth, axis=0)) > 0.05 * depth[1:]
-    jump[:, 1:] |= across
-    jump[:, :-1] |= across
-    jump[1:] |= down
-    jump[:-1] |= down
-    return jump
+def _corrected(keyframe: GroundKeyframe, trajectory: Trajectory) -> GroundKeyframe:
+    """The keyframe where the trajectory has it."""
+    index = int(np.searchsorted(trajectory.stamps_ns, keyframe.stamp_ns))
+    if index == len(trajectory) or trajectory.stamps_ns[index] != keyframe.stamp_ns:
+        return keyframe
+    return replace(keyframe, T_ground_camera=trajectory[index])
+
+
+def _moved(start: SE3, end: SE3, distance_m: float, angle_deg: float) -> bool:
+    """Whether a pose is this far from another, or turned this much."""
+    motion = start.inverse() @ end
+    return (
+        float(np.linalg.norm(motion.translation)) >= distance_m
+        or np.rad2deg(motion.angle()) >= angle_deg
+    )

@@ -19,8 +19,10 @@ from airground.core.events import (
     Event,
     GroundMapExtended,
     GroundTracked,
+    Initializing,
     MapAugmented,
     MavTracked,
+    PosesCorrected,
     SurfaceCast,
     TrackingLost,
 )
@@ -39,7 +41,7 @@ from airground.ground_map import GroundMap
 from airground.localization.heading import HeadingEstimator
 from airground.localization.particle_filter import MonteCarloLocalizer
 from airground.refinement import refine
-from airground.slam.front_end import FrontEnd, TrackedPose
+from airground.slam.front_end import FrontEnd, TrackedPose, Tracking
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,7 @@ class Mapping:
         self._magnetic: dict[Source, list[MagneticSamples]] = {Source.MAV: [], Source.GROUND: []}
         self._north = {Source.MAV: HeadingEstimator(), Source.GROUND: HeadingEstimator()}
         self.ground_map = GroundMap(ground.camera, config.ground_mapping)
+        self._ground_poses_corrected = False
         self.mav_pose: TrackedPose | None = None
         self.ground_pose: TrackedPose | None = None
 
@@ -88,6 +91,18 @@ class Mapping:
     def flush(self) -> Iterator[Event]:
         """Finish what is under construction at the end of a recording."""
         yield from self._dense.flush()
+        self._front_ends.mav.finish()
+        self._front_ends.ground.finish()
+        self._ground_poses_corrected = True
+
+    def ground_cloud(self) -> PointCloud:
+        """The ground robot's map in the frame `ground`, at the poses that are believed now."""
+        if self._ground_poses_corrected:
+            trajectory = self._front_ends.ground.trajectory()
+            if trajectory is not None:
+                self.ground_map.follow(trajectory)
+            self._ground_poses_corrected = False
+        return self.ground_map.cloud()
 
     def relative_heading(self) -> float | None:
         """Turn of the frame `mav` in `ground` by the magnetometers [rad], None before both know."""
@@ -100,19 +115,24 @@ class Mapping:
         pose = self._front_ends.mav.track(image)
         self.mav_pose = pose
         if pose.T_map_camera is None:
-            yield TrackingLost(image.stamp_ns, Source.MAV)
+            yield _no_pose(pose, Source.MAV)
             return
-        yield MavTracked(image.stamp_ns, pose.T_map_camera)
+        yield MavTracked(image.stamp_ns, pose.T_map_camera, pose.covariance, _scale_sigma(pose))
+        if pose.corrected:
+            yield PosesCorrected(image.stamp_ns, Source.MAV)
         self._take_bearing(Source.MAV, pose.T_map_camera)
-        yield from self._dense.add(image.stamp_ns, image.image, pose.T_map_camera)
+        yield from self._dense.add(image.stamp_ns, image.image, pose.T_map_camera, pose.depth_range)
 
     def _add_ground_image(self, image: GroundImage) -> Iterator[Event]:
         pose = self._front_ends.ground.track(image)
         self.ground_pose = pose
         if pose.T_map_camera is None:
-            yield TrackingLost(image.stamp_ns, Source.GROUND)
+            yield _no_pose(pose, Source.GROUND)
             return
-        yield GroundTracked(image.stamp_ns, pose.T_map_camera)
+        yield GroundTracked(image.stamp_ns, pose.T_map_camera, pose.covariance, _scale_sigma(pose))
+        if pose.corrected:
+            self._ground_poses_corrected = True
+            yield PosesCorrected(image.stamp_ns, Source.GROUND)
         self._take_bearing(Source.GROUND, pose.T_map_camera)
         if self.ground_map.wants(pose.T_map_camera):
             self.ground_map.add(image, pose.T_map_camera)
@@ -124,6 +144,17 @@ class Mapping:
         for samples in self._magnetic[robot]:
             self._north[robot].add(samples.field, T_map_camera.rotation @ R_camera_imu)
         self._magnetic[robot].clear()
+
+
+def _no_pose(pose: TrackedPose, robot: Source) -> Event:
+    """What became of an image that got no pose."""
+    if pose.tracking is Tracking.INITIALIZING:
+        return Initializing(pose.stamp_ns, robot)
+    return TrackingLost(pose.stamp_ns, robot)
+
+
+def _scale_sigma(pose: TrackedPose) -> float | None:
+    return None if pose.scale is None else pose.scale.sigma
 
 
 @dataclass(frozen=True)
@@ -154,7 +185,7 @@ def sight(surface: AerialSurface, mapping: Mapping) -> Sighting | None:
         return None
     return Sighting(
         surface,
-        mapping.ground_map.cloud(),
+        mapping.ground_cloud(),
         mav.stamp_ns,
         mav.T_map_camera,
         ground.stamp_ns,
@@ -201,7 +232,7 @@ class Pipeline:
 
     def augmented_map(self) -> AugmentedMap:
         """The ground map with everything that was aligned so far."""
-        return self._augmentation.map(self.mapping.ground_map.cloud())
+        return self._augmentation.map(self.mapping.ground_cloud())
 
     def _react(self, event: Event) -> Iterator[Event]:
         yield event

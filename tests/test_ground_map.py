@@ -7,6 +7,8 @@ from airground.config import GroundMapping
 from airground.core.camera import PinholeCamera
 from airground.core.messages import GroundImage
 from airground.core.se3 import SE3
+from airground.core.trajectory import Trajectory
+from airground.ground_keyframe import GroundKeyframe
 from airground.ground_map import GroundMap
 
 CAMERA = PinholeCamera(160, 120, 130.0, 130.0, 79.5, 59.5)
@@ -82,3 +84,77 @@ def test_keyframes_follow_motion() -> None:
     assert not ground_map.wants(SE3.from_heading(np.deg2rad(4.9), [0.09, 0, 0]))
     assert ground_map.wants(SE3.from_heading(0.0, [0.11, 0, 0]))
     assert ground_map.wants(SE3.from_heading(np.deg2rad(5.1)))
+
+
+def path(offset: float = 0.0, turn_deg: float = 0.0) -> list[SE3]:
+    """Three poses before a wall; those after the first are off by `offset` along y."""
+    return [
+        SE3.from_heading(np.deg2rad(turn_deg * (i > 0)))
+        @ SE3(FORWARD, np.array([0.1 * i, offset * i, 0.7]))
+        for i in range(3)
+    ]
+
+
+def built(poses: list[SE3]) -> GroundMap:
+    ground_map = GroundMap(CAMERA, GroundMapping(min_keyframes=1))
+    for i, pose in enumerate(poses):
+        image = wall_image(2.0 - 0.1 * i, 0.004, seed=i)
+        ground_map.add(GroundImage(i, image.colour, image.depth), pose)
+    return ground_map
+
+
+def assert_same_map(one: GroundMap, other: GroundMap) -> None:
+    assert one.cloud().points.tobytes() == other.cloud().points.tobytes()
+    assert one.cloud().colours.tobytes() == other.cloud().colours.tobytes()
+
+
+@pytest.mark.parametrize("asked_before", [False, True])
+def test_after_a_correction_the_map_is_that_of_the_corrected_poses(asked_before: bool) -> None:
+    drifted, right = built(path(0.03, 1.0)), built(path())
+    if asked_before:
+        assert drifted.cloud().points.tobytes() != right.cloud().points.tobytes()
+    assert drifted.follow(Trajectory.from_poses([0, 1, 2], path()))
+    assert_same_map(drifted, right)
+
+
+def test_a_keyframe_added_after_a_correction_joins_the_moved_ones() -> None:
+    poses = path()
+    drifted = built(path(0.03)[:2])
+    drifted.follow(Trajectory.from_poses([0, 1], poses[:2]))
+    image = wall_image(1.8, 0.004, seed=2)
+    drifted.add(GroundImage(2, image.colour, image.depth), poses[2])
+    assert_same_map(drifted, built(poses))
+
+
+def test_small_corrections_are_left_until_they_add_up() -> None:
+    ground_map, right = built(path()), path()
+    assert not ground_map.follow(Trajectory.from_poses([0, 1, 2], path(0.001)))
+    assert_same_map(ground_map, built(right))
+    assert ground_map.follow(Trajectory.from_poses([0, 1, 2], path(0.003)))
+    assert_same_map(ground_map, built(path(0.003)))
+
+
+def test_keyframes_that_the_trajectory_lacks_stay() -> None:
+    ground_map, moved = built(path()), path(0.03)
+    assert ground_map.follow(Trajectory.from_poses([1, 7], [moved[1], moved[2]]))
+    assert_same_map(ground_map, built([path()[0], moved[1], path()[2]]))
+
+
+def test_a_kept_keyframe_is_small_and_true_to_its_image() -> None:
+    rng = np.random.default_rng(1)
+    camera_shape = (480, 640)
+    depth = (2 + 0.3 * np.sin(np.arange(640) / 90) + rng.normal(0, 0.003, camera_shape)).astype(
+        np.float32
+    )
+    depth[:40] = np.nan
+    depth[-40:] = 5.5
+    colour = np.repeat(rng.integers(60, 180, (30, 40, 3), np.uint8), 16, axis=0).repeat(16, axis=1)
+    kept = GroundKeyframe.pack(GroundImage(5, colour, depth), SE3.identity(), 4.0)
+    back = kept.depth()
+    inside = back > 0
+    assert np.abs(back - depth)[inside].max() <= 0.51e-4
+    assert inside[42:-42].all()
+    assert not inside[:40].any()
+    assert not inside[-40:].any()
+    assert np.abs(kept.colour().astype(int) - colour).mean() < 4
+    assert len(kept.packed_depth) + len(kept.packed_colour) < 700_000

@@ -28,6 +28,7 @@ from airground.core.messages import (
     Stamped,
 )
 from airground.core.se3 import SE3
+from airground.core.trajectory import Trajectory
 from airground.pipeline import FrontEnds, Pipeline
 from airground.slam.front_end import TrackedPose, Tracking
 from tests.dense.synthetic import CAMERA, flight, heap_world, noisy
@@ -54,6 +55,13 @@ class Known:
     def track(self, image: MavImage | GroundImage) -> TrackedPose:
         pose = self.poses[image.stamp_ns]
         return TrackedPose(image.stamp_ns, Tracking.TRACKED if pose else Tracking.LOST, pose)
+
+    def finish(self) -> None:
+        """What is known needs no optimization."""
+
+    def trajectory(self) -> Trajectory | None:
+        known = {stamp: pose for stamp, pose in self.poses.items() if pose is not None}
+        return Trajectory.from_poses(list(known), list(known.values())) if known else None
 
 
 class Recorded:

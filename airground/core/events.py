@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from airground.core.belief import Alignment, Belief, CostMap, HeightMap
 from airground.core.cloud import PointCloud, Source
 from airground.core.se3 import SE3
@@ -21,23 +24,55 @@ class Event:
     stamp_ns: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MavTracked(Event):
-    """The MAV's camera has a pose (Sec. IV)."""
+    """The MAV's camera has a pose (Sec. IV).
+
+    Attributes:
+        T_mav_camera: Where it is.
+        covariance: (6, 6) of the pose's error in the map's axes: position [m], then
+            rotation vector [rad]; None where the front end has none.
+        scale_sigma: Standard deviation of the map's scale, as a share of it; None where it
+            is not estimated.
+    """
 
     T_mav_camera: SE3
+    covariance: NDArray[np.float64] | None = None
+    scale_sigma: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class GroundTracked(Event):
+    """The ground robot's camera has a pose (Sec. IV).
+
+    Attributes:
+        T_ground_camera: Where it is.
+        covariance: As in `MavTracked`.
+        scale_sigma: As in `MavTracked`.
+    """
+
+    T_ground_camera: SE3
+    covariance: NDArray[np.float64] | None = None
+    scale_sigma: float | None = None
 
 
 @dataclass(frozen=True)
-class GroundTracked(Event):
-    """The ground robot's camera has a pose (Sec. IV)."""
+class Initializing(Event):
+    """A robot has no map to be in yet."""
 
-    T_ground_camera: SE3
+    robot: Source
 
 
 @dataclass(frozen=True)
 class TrackingLost(Event):
-    """A robot does not know where it is."""
+    """A robot has a map and does not know where it is."""
+
+    robot: Source
+
+
+@dataclass(frozen=True)
+class PosesCorrected(Event):
+    """A robot's map changed, and its earlier poses with it."""
 
     robot: Source
 

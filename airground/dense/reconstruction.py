@@ -58,8 +58,21 @@ class DenseReconstruction:
         self._counts: NDArray[np.uint32] | None = None
         self._newest_ns = 0
 
-    def add(self, stamp_ns: int, image: NDArray[np.uint8], T_mav_camera: SE3) -> Iterator[Event]:
+    def add(
+        self,
+        stamp_ns: int,
+        image: NDArray[np.uint8],
+        T_mav_camera: SE3,
+        depth_range: tuple[float, float] | None = None,
+    ) -> Iterator[Event]:
         """Takes one frame in; yields what became of it.
+
+        Args:
+            stamp_ns: When it was taken.
+            image: (height, width).
+            T_mav_camera: Where it was taken.
+            depth_range: Nearest and farthest known point in it [m], of the sparse map of SLAM
+                (Sec. VIII-B); None where nobody knows.
 
         Raises:
             ValueError: The image does not have the camera's size.
@@ -76,7 +89,7 @@ class DenseReconstruction:
                 sweep.add(image, T_mav_camera, self._side(AFTER))
                 yield FrameAdded(stamp_ns, views.reference.stamp_ns)
         yield from self._finish([views for views, _ in self._open if views.complete])
-        yield from self._begin(frame)
+        yield from self._begin(frame, depth_range)
         self._recent.push(frame)
 
     def flush(self) -> Iterator[Event]:
@@ -87,7 +100,7 @@ class DenseReconstruction:
     def _side(self, side: int) -> int:
         return side if self.config.view_selection.both_sides else 0
 
-    def _begin(self, frame: PosedImage) -> Iterator[Event]:
+    def _begin(self, frame: PosedImage, depth_range: tuple[float, float] | None) -> Iterator[Event]:
         """Makes the frame a reference view if the last is far enough behind."""
         selection = self.config.view_selection
         last = self._last_reference
@@ -96,7 +109,7 @@ class DenseReconstruction:
         before = self._recent.around(frame)
         if not before or max(map(frame.baseline, before)) < selection.min_baseline_m:
             return
-        extent = scene_extent(frame, before, self.camera)
+        extent = scene_extent(frame, before, self.camera, depth_range)
         if extent is None or extent.near_m < selection.min_depth_m:
             return
         self._last_reference = frame

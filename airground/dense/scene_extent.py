@@ -1,8 +1,9 @@
 """How near and how far the scene before a view is (Sec. VIII-B).
 
-The paper reads it off the sparse map of the monocular SLAM. Any front end will do here, so
-the points come from the images: corners of the reference tracked into its farther views
-and triangulated with the known poses.
+The paper reads it off the sparse map of the monocular SLAM. A front end need not have one
+here, and a map in progress lacks what just came into view, so points come from the images as
+well: corners of the reference tracked into its farther views and triangulated with the known
+poses. Both ranges are joined, so that neither cuts the scene short.
 """
 
 from __future__ import annotations
@@ -38,23 +39,31 @@ class Extent:
 
 
 def scene_extent(
-    reference: PosedImage, views: list[PosedImage], camera: PinholeCamera
+    reference: PosedImage,
+    views: list[PosedImage],
+    camera: PinholeCamera,
+    mapped: tuple[float, float] | None = None,
 ) -> Extent | None:
-    """The depth range before `reference`, or None where too little can be triangulated.
+    """The depth range before `reference`, or None where too little is known of it.
 
     Args:
         reference: The view.
         views: Others of the same scene; the one with the longest baseline is used.
         camera: Of all of them.
+        mapped: Nearest and farthest point of the sparse map in the view [m], where there is
+            a map.
     """
-    if not views:
+    ranges = [] if mapped is None else [mapped]
+    if views:
+        far_view = max(views, key=reference.baseline)
+        depths = triangulated_depths(reference, far_view, camera)
+        if len(depths) >= MIN_POINTS:
+            near, far = np.percentile(depths, [ROBUST_PERCENT, 100 - ROBUST_PERCENT])
+            ranges.append((float(near), float(far)))
+    if not ranges:
         return None
-    far_view = max(views, key=reference.baseline)
-    depths = triangulated_depths(reference, far_view, camera)
-    if len(depths) < MIN_POINTS:
-        return None
-    near, far = np.percentile(depths, [ROBUST_PERCENT, 100 - ROBUST_PERCENT])
-    return Extent(float(near * (1 - MARGIN)), float(far * (1 + MARGIN)))
+    nearest, farthest = min(near for near, _ in ranges), max(far for _, far in ranges)
+    return Extent(nearest * (1 - MARGIN), farthest * (1 + MARGIN))
 
 
 def triangulated_depths(

@@ -141,3 +141,20 @@ def test_extent_of_a_blank_scene_is_unknown(step_flight: Flight) -> None:
     views = [PosedImage(i, blank, poses[i]) for i in range(6)]
     assert scene_extent(views[5], views[:5], CAMERA) is None
     assert scene_extent(views[5], [], CAMERA) is None
+
+
+def test_a_sparse_map_widens_the_extent_and_never_cuts_it(step_flight: Flight) -> None:
+    _, poses, images = step_flight
+    views = [PosedImage(i, images[i], poses[i]) for i in range(6)]
+    alone = scene_extent(views[5], views[:5], CAMERA)
+    assert alone is not None
+    middle = 0.5 * (alone.near_m + alone.far_m)
+    assert scene_extent(views[5], views[:5], CAMERA, (0.99 * middle, 1.01 * middle)) == alone
+    wide = scene_extent(views[5], views[:5], CAMERA, (0.5 * alone.near_m, 2 * alone.far_m))
+    assert wide is not None
+    assert wide.near_m < 0.5 * alone.near_m
+    assert wide.far_m > 2 * alone.far_m
+    blank = [PosedImage(i, np.full_like(images[i], 90), poses[i]) for i in range(6)]
+    mapped = scene_extent(blank[5], blank[:5], CAMERA, (1.0, 2.0))
+    assert mapped is not None
+    assert (mapped.near_m, mapped.far_m) == pytest.approx((0.94, 2.12))

@@ -1,0 +1,140 @@
+"""The seam between the front ends and the two maps: what every kind of answer leads to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from airground.config import Config, GroundMapping
+from airground.core.camera import PinholeCamera
+from airground.core.cloud import Source
+from airground.core.events import (
+    Event,
+    GroundMapExtended,
+    GroundTracked,
+    Initializing,
+    MavTracked,
+    PosesCorrected,
+    TrackingLost,
+)
+from airground.core.messages import (
+    GroundImage,
+    ImuSamples,
+    MavImage,
+    RobotCalibration,
+    Stamped,
+)
+from airground.core.se3 import SE3
+from airground.core.trajectory import Trajectory
+from airground.ground_map import GroundMap
+from airground.pipeline import FrontEnds, Mapping
+from airground.slam.front_end import ScaleEstimate, TrackedPose, Tracking
+
+CAMERA = PinholeCamera(160, 120, 130.0, 130.0, 79.5, 59.5)
+CALIBRATION = RobotCalibration(CAMERA, SE3.identity(), SE3.identity())
+CONFIG = Config(ground_mapping=GroundMapping(min_keyframes=1))
+COVARIANCE = np.diag([1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6])
+
+
+class Scripted:
+    """A front end that says what it was told to say."""
+
+    def __init__(self, answers: Sequence[TrackedPose], final: Trajectory | None = None) -> None:
+        self.answers = {answer.stamp_ns: answer for answer in answers}
+        self.final = final
+        self.finished = False
+
+    def add_imu(self, samples: ImuSamples) -> None:
+        """Nothing to be learned from them."""
+
+    def track(self, image: MavImage | GroundImage) -> TrackedPose:
+        return self.answers[image.stamp_ns]
+
+    def finish(self) -> None:
+        self.finished = True
+
+    def trajectory(self) -> Trajectory | None:
+        return self.final
+
+
+def at(x: float) -> SE3:
+    return SE3.from_heading(0.0, [x, 0.0, 0.0])
+
+
+def tracked(stamp_ns: int, x: float, corrected: bool = False) -> TrackedPose:
+    return TrackedPose(
+        stamp_ns,
+        Tracking.TRACKED,
+        at(x),
+        COVARIANCE,
+        ScaleEstimate(0.004, True),
+        corrected=corrected,
+    )
+
+
+def unposed(stamp_ns: int, tracking: Tracking) -> TrackedPose:
+    return TrackedPose(stamp_ns, tracking, None)
+
+
+def mav_image(stamp_ns: int) -> Stamped:
+    return Stamped(Source.MAV, MavImage(stamp_ns, np.zeros((120, 160), np.uint8)))
+
+
+def ground_image(stamp_ns: int) -> GroundImage:
+    return GroundImage(
+        stamp_ns, np.full((120, 160, 3), 90, np.uint8), np.full((120, 160), 2.007, np.float32)
+    )
+
+
+def mapping(mav: Scripted, ground: Scripted) -> Mapping:
+    return Mapping(CONFIG, CALIBRATION, CALIBRATION, FrontEnds(mav, ground))
+
+
+def kinds(events: Sequence[Event]) -> list[type[Event]]:
+    return [type(event) for event in events]
+
+
+def test_initializing_is_not_lost() -> None:
+    answers = [
+        unposed(0, Tracking.INITIALIZING),
+        tracked(1, 0.0),
+        unposed(2, Tracking.LOST),
+        tracked(3, 0.0, corrected=True),
+    ]
+    made = mapping(Scripted(answers), Scripted([]))
+    events = [event for stamp in range(4) for event in made.add(mav_image(stamp))]
+    assert kinds(events) == [Initializing, MavTracked, TrackingLost, MavTracked, PosesCorrected]
+    assert [event.stamp_ns for event in events] == [0, 1, 2, 3, 3]
+    pose = events[1]
+    assert isinstance(pose, MavTracked)
+    assert pose.covariance is not None
+    assert pose.covariance.tobytes() == COVARIANCE.tobytes()
+    assert pose.scale_sigma == 0.004
+
+
+def test_the_ground_map_follows_corrected_poses() -> None:
+    final = Trajectory.from_poses([0, 1], [at(0.05), at(0.2)])
+    ground = Scripted([tracked(0, 0.0), tracked(1, 0.2, corrected=True)], final)
+    made = mapping(Scripted([]), ground)
+    images = [ground_image(stamp) for stamp in range(2)]
+    first = list(made.add(Stamped(Source.GROUND, images[0])))
+    assert kinds(first) == [GroundTracked, GroundMapExtended]
+    assert len(made.ground_cloud()) > 0
+    assert PosesCorrected in kinds(list(made.add(Stamped(Source.GROUND, images[1]))))
+    expected = GroundMap(CAMERA, CONFIG.ground_mapping)
+    for image, pose in zip(images, (at(0.05), at(0.2)), strict=True):
+        expected.add(image, pose)
+    assert made.ground_cloud().points.tobytes() == expected.cloud().points.tobytes()
+
+
+def test_what_the_front_ends_put_off_reaches_the_map_at_the_end() -> None:
+    mav = Scripted([])
+    ground = Scripted([tracked(0, 0.0)], Trajectory.from_poses([0], [at(0.5)]))
+    made = mapping(mav, ground)
+    list(made.add(Stamped(Source.GROUND, ground_image(0))))
+    before = made.ground_cloud().points[:, 0].mean()
+    list(made.flush())
+    assert mav.finished
+    assert ground.finished
+    assert abs(made.ground_cloud().points[:, 0].mean() - before - 0.5) < 0.01
