@@ -128,6 +128,23 @@ class Twin:
         return cost, weighted.T @ jacobian, weighted.T @ residuals
 
 
+def dense(equations):
+    """The whole Hessian from its upper triangle, its chain and what couples them."""
+    width, count = len(equations.poses), len(equations.chain)
+    full = np.zeros((width + 9 * count, width + 9 * count))
+    full[:width, :width] = np.triu(equations.poses)
+    for k in range(count):
+        row = width + 9 * k
+        full[row : row + 9, row : row + 9] = np.triu(equations.chain[k])
+        if k + 1 < count:
+            full[row : row + 9, row + 9 : row + 18] = equations.links[k]
+        for n, pose in enumerate(range(k - 1, k + 2)):
+            if 0 <= pose < count:
+                block = equations.coupling[k][:, 6 * n : 6 * n + 6]
+                full[6 * pose : 6 * pose + 6, row : row + 9] = block.T
+    return full + np.triu(full, 1).T
+
+
 def so3_clean(matrix):
     u, _, vt = np.linalg.svd(matrix)
     return u @ vt
@@ -187,7 +204,7 @@ def test_normal_equations_and_step_equal_the_numerical_ones(name):
     points_block = full[n:, n:]
     reduced = full[:n, :n] - full[:n, n:] @ np.linalg.solve(points_block, full[n:, :n])
     toward = gradient[:n] - full[:n, n:] @ np.linalg.solve(points_block, gradient[n:])
-    ours = np.triu(equations.hessian) + np.triu(equations.hessian, 1).T
+    ours = dense(equations)
     ours += damping * np.diag(equations.diagonal)
     scale = np.sqrt(np.outer(np.diag(full)[:n], np.diag(full)[:n]))
     np.testing.assert_allclose(ours / scale, reduced / scale, atol=2e-6)
@@ -195,6 +212,8 @@ def test_normal_equations_and_step_equal_the_numerical_ones(name):
     np.testing.assert_allclose(equations.gradient, toward, atol=2e-6 * size)
 
     step = -np.linalg.solve(full, gradient)
+    ours = bundle_solver.solve(equations, damping)
+    np.testing.assert_allclose(ours, step[:n], atol=1e-6)
     moved = model.moved(start, linear, damping, step[:n])
     np.testing.assert_allclose(moved.points.ravel(), twin._moved(step)[2].ravel(), atol=1e-5)
     np.testing.assert_allclose(moved.rotations, twin._moved(step)[1], atol=1e-9)

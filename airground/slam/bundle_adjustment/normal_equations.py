@@ -52,18 +52,24 @@ class Linearization:
 
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
-    """Of the moving keyframes, points eliminated.
+    """Of the F moving keyframes, points eliminated.
 
-    Poses (rotation, position) of all F moving keyframes come first, then, where there are
-    inertial factors, velocity and biases of each.
+    Unknowns are the poses (rotation, position) of all keyframes and then, where there are
+    inertial factors, velocity and biases of each. These couple in time only: `chain`.
 
     Attributes:
-        hessian: (N, N), upper triangle; N is 6 F or 15 F.
-        gradient: (N,).
+        poses: (6 F, 6 F) of the Hessian, upper triangle.
+        chain, links: (F, 9, 9) velocity and biases of a keyframe with themselves and with
+            those of the next; F is 0 without inertial factors, here and below.
+        coupling: (F, 9, 18) with the poses of the keyframe before, the same, and the next.
+        gradient: (N,), N is 6 F or 15 F.
         diagonal: (N,) of the Hessian before the points were eliminated.
     """
 
-    hessian: NDArray[np.float64]
+    poses: NDArray[np.float64]
+    chain: NDArray[np.float64]
+    links: NDArray[np.float64]
+    coupling: NDArray[np.float64]
     gradient: NDArray[np.float64]
     diagonal: NDArray[np.float64]
 
@@ -160,11 +166,18 @@ class Model:
 
     def normal_equations(self, at: Linearization, damping: float) -> NormalEquations:
         """With the points' blocks damped, the keyframes' not yet."""
-        n = self.size
-        hessian, gradient, diagonal = np.zeros((n, n)), np.zeros(n), np.zeros(n)
+        width, links = 6 * self.moving, self.moving if self.inertial else 0
+        out = NormalEquations(
+            np.zeros((width, width)),
+            np.zeros((links, 9, 9)),
+            np.zeros((links, 9, 9)),
+            np.zeros((links, 9, 18)),
+            np.zeros(self.size),
+            np.zeros(self.size),
+        )
         seen = self.observations
         schur.eliminate_points(
-            at.visual, seen.starts, seen.slots, damping, hessian, gradient, diagonal
+            at.visual, seen.starts, seen.slots, damping, out.poses, out.gradient, out.diagonal
         )
         if self.inertial:
             _add_motions(
@@ -172,21 +185,24 @@ class Model:
                 self.slots,
                 at.motion_residuals,
                 at.motion_jacobians,
-                hessian,
-                gradient,
-                diagonal,
+                out.poses,
+                out.chain,
+                out.links,
+                out.coupling,
+                out.gradient,
+                out.diagonal,
             )
         _add_priors(
             self.sharpness,
             self.slots,
             at.prior_residuals,
             at.headings,
-            self.inertial,
-            hessian,
-            gradient,
-            diagonal,
+            out.poses,
+            out.chain,
+            out.gradient,
+            out.diagonal,
         )
-        return NormalEquations(hessian, gradient, diagonal)
+        return out
 
     def moved(
         self, at: Estimate, linear: Linearization, damping: float, step: NDArray[np.float64]
@@ -212,30 +228,42 @@ def _add_motions(
     slots: NDArray,
     residual: NDArray,
     jacobian: NDArray,
-    hessian: NDArray,
+    poses: NDArray,
+    chain: NDArray,
+    links: NDArray,
+    coupling: NDArray,
     gradient: NDArray,
     diagonal: NDArray,
 ) -> None:
-    """Add J'J and J'r of the inertial factors, upper triangle."""
-    moving = len(gradient) // 15
-    places = np.empty(30, np.int64)
+    """Add J'J and J'r of the inertial factors."""
+    moving = len(chain)
     for f in range(len(firsts)):
-        for n in range(30):
-            slot = slots[firsts[f] + n // 15]
-            places[n] = _place(slot, moving, n % 15) if slot >= 0 else -1
         transposed = np.ascontiguousarray(jacobian[f].T)
         product = transposed @ jacobian[f]
         toward = transposed @ residual[f]
-        for i in range(30):
-            row = places[i]
-            if row < 0:
+        for one in range(2):
+            s, i = slots[firsts[f] + one], 15 * one
+            if s < 0:
                 continue
-            gradient[row] += toward[i]
-            diagonal[row] += product[i, i]
-            for j in range(30):
-                column = places[j]
-                if column >= row:
-                    hessian[row, column] += product[i, j]
+            chain[s] += product[i + 6 : i + 15, i + 6 : i + 15]
+            for n in range(15):
+                at = _place(s, moving, n)
+                gradient[at] += toward[i + n]
+                diagonal[at] += product[i + n, i + n]
+            for other in range(2):
+                t, j = slots[firsts[f] + other], 15 * other
+                if t < 0:
+                    continue
+                # Neighbours in time have neighbouring slots.
+                c = 6 * (t - s + 1)
+                coupling[s, :, c : c + 6] += product[i + 6 : i + 15, j : j + 6]
+                if t >= s:
+                    pose, next_pose = 6 * s, 6 * t
+                    poses[pose : pose + 6, next_pose : next_pose + 6] += product[
+                        i : i + 6, j : j + 6
+                    ]
+                if t > s:
+                    links[s] += product[i + 6 : i + 15, j + 6 : j + 15]
 
 
 @njit(cache=True, error_model="numpy")
@@ -244,28 +272,31 @@ def _add_priors(
     slots: NDArray,
     residual: NDArray,
     headings: NDArray,
-    inertial: bool,
-    hessian: NDArray,
+    poses: NDArray,
+    chain: NDArray,
     gradient: NDArray,
     diagonal: NDArray,
 ) -> None:
-    """Add J'J and J'r of the priors, upper triangle."""
-    moving = len(gradient) // (15 if inertial else 6)
+    """Add J'J and J'r of the priors."""
     for k in range(len(slots)):
         if slots[k] < 0:
             continue
-        turn = 6 * slots[k]
+        s, turn = slots[k], 6 * slots[k]
         for i in range(3):
             gradient[turn + i] += headings[k, i] * residual[k, 3]
             diagonal[turn + i] += headings[k, i] ** 2
             for j in range(i, 3):
-                hessian[turn + i, turn + j] += headings[k, i] * headings[k, j]
-        for n in range(12 if inertial else 3):
+                poses[turn + i, turn + j] += headings[k, i] * headings[k, j]
+        for n in range(12 if len(chain) else 3):
             row = n if n < 3 else n + 1
-            at = _place(slots[k], moving, 3 + n)
+            at = _place(s, len(chain), 3 + n)
+            information = sharpness[k, row] ** 2
             gradient[at] += sharpness[k, row] * residual[k, row]
-            diagonal[at] += sharpness[k, row] ** 2
-            hessian[at, at] += sharpness[k, row] ** 2
+            diagonal[at] += information
+            if n < 3:
+                poses[at, at] += information
+            else:
+                chain[s, n - 3, n - 3] += information
 
 
 @njit(cache=True, error_model="numpy")

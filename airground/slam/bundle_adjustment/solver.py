@@ -11,6 +11,7 @@ from scipy.linalg.lapack import dpotrf, dpotrs
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam.bundle_adjustment import inertial_residuals, residuals
+from airground.slam.bundle_adjustment.chain import eliminate_chain
 from airground.slam.bundle_adjustment.normal_equations import (
     Estimate,
     Linearization,
@@ -126,7 +127,7 @@ def _descend(
     tried = 0
     while tried < settings.iterations and damping <= MOST_DAMPING:
         tried += 1
-        step = _solve(model.normal_equations(linear, damping), damping)
+        step = solve(model.normal_equations(linear, damping), damping)
         if step is None:
             damping *= DAMPING_FACTOR
             continue
@@ -145,22 +146,46 @@ def _descend(
     return best, linear, cost_before, tried
 
 
-def _solve(equations: NormalEquations, damping: float) -> NDArray[np.float64] | None:
+def solve(equations: NormalEquations, damping: float) -> NDArray[np.float64] | None:
     """(N,) step of the keyframes; None where the matrix is not positive definite."""
-    lower = _factor(equations, damping)
-    return None if lower is None else -_back(lower, equations.gradient)
+    reduced = _reduce(equations, damping)
+    if reduced is None:
+        return None
+    lower, toward, spread, offset = reduced
+    poses = -_back(lower, toward)
+    return np.concatenate([poses, -(offset + spread @ poses).ravel()])
 
 
-def _factor(equations: NormalEquations, damping: float) -> NDArray[np.float64] | None:
-    """(N, N) Cholesky factor of the damped Hessian, which it overwrites; None without one."""
+def _reduce(
+    equations: NormalEquations, damping: float
+) -> tuple[NDArray, NDArray, NDArray, NDArray] | None:
+    """Cholesky factor and gradient of the poses alone, Z and z of `eliminate_chain`.
+
+    Overwrites the equations. None where the matrix is not positive definite.
+    """
+    poses, chain = equations.poses, equations.chain
+    width = len(poses)
     # An unknown that nothing touches stays where it is.
     added = np.where(equations.diagonal > 0.0, damping * equations.diagonal, 1.0)
-    equations.hessian.ravel()[:: len(added) + 1] += added
-    if not len(added):
-        return equations.hessian
+    poses.ravel()[:: width + 1] += added[:width]
+    chain[:, range(9), range(9)] += added[width:].reshape(-1, 9)
+    toward = equations.gradient[:width].copy()
+    try:
+        spread, offset = eliminate_chain(
+            chain,
+            equations.links,
+            equations.coupling,
+            equations.gradient[width:].reshape(-1, 9),
+            poses,
+            toward,
+        )
+    except np.linalg.LinAlgError:
+        return None
+    if not width:
+        return poses, toward, spread, offset
     # The upper triangle by rows is LAPACK's lower triangle by columns.
-    lower, failed = dpotrf(equations.hessian.T, lower=1, overwrite_a=1, clean=0)
-    return None if failed else lower
+    lower, failed = dpotrf(poses.T, lower=1, overwrite_a=1, clean=0)
+    return None if failed else (lower, toward, spread, offset)
 
 
 def _back(lower: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -176,15 +201,14 @@ def _last_covariance(
         return None
     equations = model.normal_equations(linear, 0.0)
     unknowns = 6 * int(free_slots[-1]) + np.array([3, 4, 5, 0, 1, 2])
-    if not (equations.diagonal[unknowns] > 0.0).all():
+    alone = equations.diagonal[unknowns]
+    reduced = _reduce(equations, 0.0)
+    if reduced is None:
         return None
-    lower = _factor(equations, 0.0)
-    if lower is None:
-        return None
-    units = np.zeros((model.size, 6))
+    units = np.zeros((6 * model.moving, 6))
     units[unknowns, range(6)] = 1.0
-    covariance = _back(lower, units)[unknowns]
-    if not (np.diag(covariance) * equations.diagonal[unknowns] < OPEN).all():
+    covariance = _back(reduced[0], units)[unknowns]
+    if not ((alone > 0.0) & (np.diag(covariance) * alone < OPEN)).all():
         return None
     return 0.5 * (covariance + covariance.T)
 
