@@ -8,8 +8,8 @@ from airground.core.camera import PinholeCamera
 from airground.core.messages import GroundImage
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
-from airground.ground_keyframe import GroundKeyframe
 from airground.ground_map import GroundMap
+from airground.ground_map.keyframe import GroundKeyframe
 
 CAMERA = PinholeCamera(160, 120, 130.0, 130.0, 79.5, 59.5)
 # Looking along x, z up: camera x is -y, camera y is -z, camera z is x.

@@ -1,4 +1,4 @@
-"""The ground robot's map from RGB-D frames and their poses (Sec. IV).
+"""Keyframes of the ground robot, fused where their poses are believed to be (Sec. IV).
 
 Keyframes are fused in a truncated signed distance field, which averages the sensor's noise
 along its rays. Averaging points in cubes does not: at 4 m the noise of structured light is
@@ -20,7 +20,7 @@ from airground.core.cloud import PointCloud
 from airground.core.messages import GroundImage
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
-from airground.ground_keyframe import GroundKeyframe
+from airground.ground_map.keyframe import GroundKeyframe
 
 _BLOCK = 8
 _FIRST_BLOCKS = 10_000

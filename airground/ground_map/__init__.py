@@ -1,0 +1,5 @@
+"""The ground robot's map from RGB-D frames and their poses (Sec. IV)."""
+
+from airground.ground_map.fused_map import GroundMap
+
+__all__ = ["GroundMap"]
