@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from airground.core.arrays import read_only
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3, nearest_rotation
-from airground.slam.geometry.epipolar import MAX_CHI2, direction_by_two_rays, refine
+from airground.slam.geometry.epipolar import direction_by_two_rays, refine
 from airground.slam.geometry.triangulation import Triangulated, triangulate_pairs
 
 SAMPLES = 200
@@ -43,8 +43,8 @@ class TwoViewStart:
             None where refused.
         points_a: (N, 3) in view a; NaN where not an inlier.
         inliers: (N,) bool.
-        parallax_rad: Median angle between the rays of the matches, rotation removed; NaN
-            where no pose was found.
+        parallax_rad: Median angle between the inliers' rays, rotation removed (of all matches
+            where there is no inlier); NaN where no pose was found.
         good: Whether the start may be used.
         reason: Why not; empty when good.
     """
@@ -95,7 +95,7 @@ def start_from_two_views(
     Args:
         pixels_a, pixels_b: (N, 2) matches, wrong ones among them.
         camera: That took both.
-        rng: Draws the samples.
+        rng: Draws the samples where the rotation is known.
         R_a_b: (3, 3) relative rotation from the gyro; None if unknown.
         rotation_sigma: How well it is known, per axis [rad].
         sigma_px: Noise of a pixel, per axis.
@@ -115,11 +115,8 @@ def start_from_two_views(
         starts = _known_rotation(rays_a, rays_b, np.array(R_a_b, np.float64), wide, rng)
     else:
         wide, rotation_sigma = 3.0 * sigma, np.inf
-        starts = _unknown_rotation(rays_a, rays_b, wide, rng)
-    answers = [
-        _answer(R, t, rays_a, rays_b, (wide, sigma, rotation_sigma), MAX_REPROJECTION_CHI2)
-        for R, t in starts
-    ]
+        starts = _unknown_rotation(rays_a, rays_b, wide)
+    answers = [_answer(R, t, rays_a, rays_b, (wide, sigma, rotation_sigma)) for R, t in starts]
     if not answers:
         return _refused(n, np.nan, "no relative pose explains the matches")
     best = min(answers, key=lambda answer: answer.cost)
@@ -133,7 +130,6 @@ def _answer(
     rays_a: NDArray,
     rays_b: NDArray,
     sigmas: tuple[float, float, float],
-    max_chi2: float,
 ) -> _Answer:
     """Refine one start, give the translation its sign, and triangulate."""
     wide, sigma, rotation_sigma = sigmas
@@ -144,17 +140,14 @@ def _answer(
     both = []
     for T_a_b in (SE3(R, t), SE3(R, -t)):
         points = triangulate_pairs(SE3.identity(), rays_a, T_a_b, rays_b, unit)
-        agrees = points.good & (points.reprojection_px**2 < max_chi2 * sigma**2)
+        agrees = points.good & (points.reprojection_px**2 < MAX_REPROJECTION_CHI2 * sigma**2)
         agrees[near] &= meet
         agrees &= near
         both.append((int(agrees.sum()), T_a_b, points, agrees))
     _, T_a_b, points, inliers = max(both, key=lambda found: found[0])
-    # The sum of both squared errors is at most twice the larger one.
-    errors = np.where(inliers, (points.reprojection_px / sigma) ** 2, MAX_CHI2)
+    errors = np.where(inliers, (points.reprojection_px / sigma) ** 2, MAX_REPROJECTION_CHI2)
     direction_sigma = float(np.sqrt(np.trace(covariance[:2, :2])))
-    return _Answer(
-        T_a_b, points, inliers, float(np.minimum(errors, MAX_CHI2).sum()), direction_sigma
-    )
+    return _Answer(T_a_b, points, inliers, float(errors.sum()), direction_sigma)
 
 
 def _shifted_alike(rays_a: NDArray, rays_b: NDArray, R: NDArray) -> NDArray[np.bool_]:
@@ -180,10 +173,10 @@ def _known_rotation(
 
 
 def _unknown_rotation(
-    rays_a: NDArray, rays_b: NDArray, threshold: float, rng: np.random.Generator
+    rays_a: NDArray, rays_b: NDArray, threshold: float
 ) -> list[tuple[NDArray, NDArray]]:
     """Rotations and directions that an essential matrix or a homography allows."""
-    cv2.setRNGSeed(int(rng.integers(2**31)))
+    # USAC starts its own generator anew in every call: the same input, the same answer.
     starts: list[tuple[NDArray, NDArray]] = []
     E, _ = cv2.findEssentialMat(rays_b, rays_a, np.eye(3), cv2.USAC_ACCURATE, 0.9999, threshold)
     if E is not None and E.shape == (3, 3):
@@ -203,7 +196,8 @@ def _unknown_rotation(
 def _judged(best: _Answer, others: list[_Answer], min_parallax_deg: float) -> TwoViewStart:
     """Scale the best answer, or say why it is not good enough."""
     n, count = len(best.inliers), int(best.inliers.sum())
-    parallax = float(np.median(best.points.parallax_rad))
+    chosen = best.inliers if count else np.ones(n, bool)
+    parallax = float(np.median(best.points.parallax_rad[chosen]))
     degrees = np.rad2deg(parallax)
     if degrees < min_parallax_deg:
         reason = f"parallax of {degrees:.2f} deg, at least {min_parallax_deg} is needed"
