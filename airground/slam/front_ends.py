@@ -18,6 +18,7 @@ from airground.slam.baselines.open3d_odometry import open3d_odometry
 from airground.slam.baselines.opencv_odometry import opencv_odometry
 from airground.slam.baselines.trajectory_file import TrajectoryFile
 from airground.slam.front_end import FrontEnd
+from airground.slam.monocular import MonocularSlam
 from airground.slam.rgbd import RgbdSlam
 
 
@@ -47,6 +48,7 @@ class Ingredients:
 
 
 MAV: dict[str, Callable[[Ingredients], FrontEnd[MavImage]]] = {
+    "slam": lambda given: MonocularSlam(given.calibration, given.config),
     "file": lambda given: TrajectoryFile(given.given_trajectory()),
 }
 """Of the MAV: grey images and IMU."""

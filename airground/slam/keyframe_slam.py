@@ -36,7 +36,7 @@ MAX_COAST_S = 3.0
 FIRST_GLOBAL_ADJUSTMENT = 8
 """The whole map is adjusted at this many keyframes, and whenever it has grown by half: what
 the beginning got wrong shows only later, and would bend all that stands on it."""
-GLOBAL_ADJUSTMENT_GROWTH = 1.5
+GLOBAL_ADJUSTMENT_GROWTH = 1.3
 MAX_JUMP_M = 0.25
 """No robot here moves so far between prediction and measurement from image to image."""
 DEPTH_RANGE_PERCENT = 2.0

@@ -78,10 +78,18 @@ class MapAdjuster:
         return self._adjust(fixed + free, roles, inertial, settings)
 
     def adjust_all(self, inertial: bool) -> NDArray[np.float64] | None:
-        """Move the whole map; place and heading of the first keyframe stay."""
+        """Move the whole map.
+
+        With an IMU, place and heading of the newest keyframe stay, so that a better vertical
+        turns the past about the robot instead of moving the robot about the past. Without,
+        the first keyframe stays, since only there it is known where up is.
+        """
         count = len(self._map.keyframes)
         roles = np.full(count, Role.FREE)
-        roles[0] = Role.GAUGE if inertial else Role.FIXED
+        if inertial:
+            roles[-1] = Role.GAUGE
+        else:
+            roles[0] = Role.FIXED
         settings = Settings(iterations=GLOBAL_ITERATIONS)
         return self._adjust(list(range(count)), roles, inertial, settings)
 

@@ -132,7 +132,7 @@ class Settings:
 
     iterations: int = 8
     huber: float = 1.5
-    relative_decrease: float = 1e-5
+    relative_decrease: float = 1e-4
     gyro_bias_prior_sigma: float | None = 0.05
     accelerometer_bias_prior_sigma: float | None = 0.3
     still_sigma: float = 0.005
@@ -161,6 +161,15 @@ class Adjustment:
     cost_after: float
     iterations: int
     covariance: NDArray[np.float64] | None
+
+    def __post_init__(self) -> None:
+        points = read_only(self.points, "points", (None, 3), np.float64)
+        object.__setattr__(self, "points", points)
+        residuals_px = read_only(self.residuals_px, "residuals_px", (None,), np.float64)
+        object.__setattr__(self, "residuals_px", residuals_px)
+        if self.covariance is not None:
+            covariance = read_only(self.covariance, "covariance", (6, 6), np.float64)
+            object.__setattr__(self, "covariance", covariance)
 
 
 def check(

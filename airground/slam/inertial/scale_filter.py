@@ -1,0 +1,190 @@
+"""Metric scale by a Kalman filter beside the visual tracking (Sec. IV).
+
+The paper gives its filter to Weiss and Siegwart, "Real-time metric state estimation for
+modular vision-inertial systems", ICRA 2011. As there, vision gives poses and the IMU drives
+the prediction. Here the state is in visual units, where vision is right: were positions
+metric and measured as (1 / scale) times that, the product of two unknowns would draw the
+scale away (up to -37 %). The state holds the inverse of the scale, and bias and tilt times
+it: in these the motion is linear, so that no first guess of the scale is needed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.se3 import SE3
+from airground.slam import so3
+from airground.slam.inertial.alignment import (
+    ACCELEROMETER_BIAS_SIGMA,
+    OBSERVABLE_SIGMA,
+    VisualNoise,
+)
+from airground.slam.inertial.alignment_start import tangent_basis
+from airground.slam.inertial.preintegration import GRAVITY, Preintegration
+
+POSITION, VELOCITY, BIAS = slice(0, 3), slice(3, 6), slice(6, 9)
+UNIT, TILTS, SIZE = 9, slice(10, 12), 12
+UNIT_SIGMA = 5.0
+"""Prior of the unit as a share of the guess: it may be anything."""
+SPEED_SIGMA = 5.0
+"""Prior of each axis of the velocity [m/s]."""
+TILT_SIGMA = 0.2
+"""Prior of gravity's direction from one specific force: robots push with 2 m/s^2 [rad]."""
+SURE_SIGMA = 0.2
+"""Scale must be known to this share before gravity's direction is worth correcting."""
+ROTATION_GAIN = 0.1
+"""Share of vision in the rotation, the rest is the gyro's: turned by vision alone, gravity
+shakes with the visual noise, and a hovering robot seems to move."""
+MEMORY = 100
+"""Innovations of so many images tell whether the noise is the stated one."""
+
+
+class ScaleFilter:
+    """Scale and gravity of a visual map, image by image.
+
+    Args:
+        T_rig_camera: Camera in the rig (the IMU).
+        noise: Of the visual poses, independent from image to image.
+        guess: Metres in a visual unit, only to weigh the priors.
+    """
+
+    def __init__(self, T_rig_camera: SE3, noise: VisualNoise, guess: float = 1.0) -> None:
+        self._lever = T_rig_camera.translation
+        self._noise = noise
+        self._mean = np.zeros(SIZE)
+        self._mean[UNIT] = 1.0 / guess
+        sigmas = np.empty(SIZE)
+        sigmas[POSITION], sigmas[VELOCITY] = SPEED_SIGMA, SPEED_SIGMA
+        sigmas[BIAS], sigmas[TILTS] = ACCELEROMETER_BIAS_SIGMA, TILT_SIGMA
+        sigmas[UNIT] = UNIT_SIGMA
+        self._covariance = np.diag((sigmas / guess) ** 2)
+        self._gravity: NDArray[np.float64] | None = None
+        self._rotation: NDArray[np.float64] | None = None
+        self._images = 0
+        self._surprise = 1.0
+
+    @property
+    def scale(self) -> float:
+        """Metres in a visual unit; NaN while not even its sign is known."""
+        unit = float(self._mean[UNIT])
+        return 1.0 / unit if unit > 0.0 and self._gravity is not None else np.nan
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of the scale, as a share; infinite while it is not known."""
+        sigma = float(np.sqrt(self._covariance[UNIT, UNIT])) * self.scale
+        # Where vision errs more than it was said to, so does the scale.
+        return sigma * max(1.0, self._surprise**0.5) if np.isfinite(sigma) else np.inf
+
+    @property
+    def observable(self) -> bool:
+        """Whether the motion so far shows the scale to 5 %."""
+        return self.sigma < OBSERVABLE_SIGMA
+
+    @property
+    def gravity(self) -> NDArray[np.float64] | None:
+        """(3,) in the visual map's axes [m/s^2]; None before the first inertial motion."""
+        return self._gravity
+
+    @property
+    def velocity(self) -> NDArray[np.float64]:
+        """(3,) of the rig in the visual map's axes [m/s]; NaN while the scale is."""
+        return self._mean[VELOCITY] * self.scale
+
+    @property
+    def accelerometer_bias(self) -> NDArray[np.float64]:
+        """(3,) [m/s^2]; NaN while the scale is."""
+        return self._mean[BIAS] * self.scale
+
+    def add(
+        self,
+        rotation: NDArray[np.float64],
+        centre: NDArray[np.float64],
+        motion: Preintegration | None,
+    ) -> None:
+        """Take in one image.
+
+        Args:
+            rotation: (3, 3) `R_v_rig` by vision.
+            centre: (3,) of the camera in the visual map.
+            motion: Since the image before; None for the first one, and where tracking or
+                samples were lost in between.
+        """
+        if motion is not None and self._rotation is not None:
+            self._predict(self._rotation, motion)
+            turned = self._rotation @ motion.rotation
+            self._images += 1
+            share = max(ROTATION_GAIN, 1.0 / self._images)
+            self._rotation = turned @ so3.exp(share * so3.log(turned.T @ rotation))
+        else:
+            self._forget_motion(centre)
+            self._rotation, self._images = np.array(rotation), 1
+        self._update(self._rotation, centre)
+        self._turn_gravity()
+
+    def _forget_motion(self, centre: NDArray[np.float64]) -> None:
+        """The robot may be anywhere, at any speed."""
+        unit = abs(self._mean[UNIT])
+        self._covariance[:6], self._covariance[:, :6] = 0.0, 0.0
+        self._covariance[range(6), range(6)] = (SPEED_SIGMA * unit) ** 2
+        self._mean[POSITION], self._mean[VELOCITY] = centre, 0.0
+
+    def _predict(self, R: NDArray[np.float64], motion: Preintegration) -> None:
+        """Move on by one inertial motion that began at rotation R."""
+        t = motion.duration_s
+        by_bias = motion.velocity_by_accelerometer_bias, motion.position_by_accelerometer_bias
+        # The bias of the state counts from zero, not from where the motion was linearized.
+        sped = R @ (motion.velocity - by_bias[0] @ motion.accelerometer_bias)
+        moved = R @ (motion.position - by_bias[1] @ motion.accelerometer_bias)
+        if self._gravity is None:
+            self._gravity = -GRAVITY * sped / np.linalg.norm(sped)
+        tilts = -so3.hat(self._gravity) @ tangent_basis(self._gravity)
+        F = np.eye(SIZE)
+        F[POSITION, VELOCITY] = t * np.eye(3)
+        F[POSITION, BIAS], F[VELOCITY, BIAS] = R @ by_bias[1], R @ by_bias[0]
+        F[POSITION, UNIT] = moved + 0.5 * t * t * self._gravity
+        F[VELOCITY, UNIT] = sped + t * self._gravity
+        F[POSITION, TILTS], F[VELOCITY, TILTS] = 0.5 * t * t * tilts, t * tilts
+
+        # White noise of the samples, and the visual rotation that turns them; in metres.
+        noise = np.zeros((SIZE, SIZE))
+        order = np.r_[6:9, 3:6]
+        turn = np.zeros((6, 6))
+        turn[:3, :3] = turn[3:, 3:] = R
+        swing = np.concatenate([so3.hat(moved), so3.hat(sped)])
+        noise[:6, :6] = turn @ motion.covariance[np.ix_(order, order)] @ turn.T
+        noise[:6, :6] += self._noise.rotation_sigma**2 * swing @ swing.T
+        noise[BIAS, BIAS] = motion.accelerometer_bias_sigma**2 * np.eye(3)
+        self._mean = F @ self._mean
+        self._covariance = F @ self._covariance @ F.T + self._mean[UNIT] ** 2 * noise
+
+    def _update(self, rotation: NDArray[np.float64], centre: NDArray[np.float64]) -> None:
+        """Take in where the camera is."""
+        H = np.zeros((3, SIZE))
+        H[:, POSITION] = np.eye(3)
+        H[:, UNIT] = rotation @ self._lever
+        white = self._noise.position_sigma**2 * np.eye(3)
+        innovation = centre - H @ self._mean
+        S = H @ self._covariance @ H.T + white
+        gain = np.linalg.solve(S, H @ self._covariance).T
+        self._mean = self._mean + gain @ innovation
+        keep = np.eye(SIZE) - gain @ H
+        self._covariance = keep @ self._covariance @ keep.T + gain @ white @ gain.T
+        surprise = float(innovation @ np.linalg.solve(S, innovation)) / 3.0
+        self._surprise += (surprise - self._surprise) / MEMORY
+
+    def _turn_gravity(self) -> None:
+        """Put the tilt that was found into gravity's direction, so that it stays small."""
+        if self._gravity is None or not self.sigma < SURE_SIGMA:
+            return
+        basis = tangent_basis(self._gravity)
+        tilt = self._mean[TILTS] / self._mean[UNIT]
+        turned = so3.exp(basis @ tilt) @ self._gravity
+        # Tilts are measured along the new direction's own axes, and from it.
+        change = np.eye(SIZE)
+        change[TILTS, TILTS] = tangent_basis(turned).T @ basis
+        change[TILTS, UNIT] = -change[TILTS, TILTS] @ tilt
+        self._mean = change @ self._mean
+        self._covariance = change @ self._covariance @ change.T
+        self._gravity = turned * (GRAVITY / np.linalg.norm(turned))
