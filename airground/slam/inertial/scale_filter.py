@@ -157,7 +157,9 @@ class ScaleFilter:
         noise[:6, :6] += self._noise.rotation_sigma**2 * swing @ swing.T
         noise[BIAS, BIAS] = motion.accelerometer_bias_sigma**2 * np.eye(3)
         self._mean = F @ self._mean
-        self._covariance = F @ self._covariance @ F.T + self._mean[UNIT] ** 2 * noise
+        # The unit's expected square: while it is open, its mean may be near zero by chance.
+        square = self._mean[UNIT] ** 2 + self._covariance[UNIT, UNIT]
+        self._covariance = F @ self._covariance @ F.T + square * noise
 
     def _update(self, rotation: NDArray[np.float64], centre: NDArray[np.float64]) -> None:
         """Take in where the camera is."""
