@@ -15,6 +15,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from airground.slam import so3
+from airground.slam.bundle_adjustment.chain import place
 from airground.slam.bundle_adjustment.problem import InertialFactor
 from airground.slam.inertial.preintegration import GRAVITY_MAP
 
@@ -181,3 +182,47 @@ def linearize_motions(
         jacobians[n] = whitening[n] @ jacobian
         total += 0.5 * np.dot(residuals[n], residuals[n])
     return total
+
+
+@njit(cache=True, error_model="numpy")
+def add_motions(
+    firsts: NDArray,
+    slots: NDArray,
+    residual: NDArray,
+    jacobian: NDArray,
+    poses: NDArray,
+    chain: NDArray,
+    links: NDArray,
+    coupling: NDArray,
+    gradient: NDArray,
+    diagonal: NDArray,
+) -> None:
+    """Add J'J and J'r of the inertial factors."""
+    moving = len(chain)
+    for f in range(len(firsts)):
+        transposed = np.ascontiguousarray(jacobian[f].T)
+        product = transposed @ jacobian[f]
+        toward = transposed @ residual[f]
+        for one in range(2):
+            s, i = slots[firsts[f] + one], 15 * one
+            if s < 0:
+                continue
+            chain[s] += product[i + 6 : i + 15, i + 6 : i + 15]
+            for n in range(15):
+                at = place(s, moving, n)
+                gradient[at] += toward[i + n]
+                diagonal[at] += product[i + n, i + n]
+            for other in range(2):
+                t, j = slots[firsts[f] + other], 15 * other
+                if t < 0:
+                    continue
+                # Neighbours in time have neighbouring slots.
+                c = 6 * (t - s + 1)
+                coupling[s, :, c : c + 6] += product[i + 6 : i + 15, j : j + 6]
+                if t >= s:
+                    pose, next_pose = 6 * s, 6 * t
+                    poses[pose : pose + 6, next_pose : next_pose + 6] += product[
+                        i : i + 6, j : j + 6
+                    ]
+                if t > s:
+                    links[s] += product[i + 6 : i + 15, j + 6 : j + 15]

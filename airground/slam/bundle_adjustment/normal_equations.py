@@ -12,6 +12,7 @@ from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam import so3
 from airground.slam.bundle_adjustment import inertial_residuals, priors, residuals, schur
+from airground.slam.bundle_adjustment.chain import place
 from airground.slam.bundle_adjustment.inertial_residuals import PackedMotions
 from airground.slam.bundle_adjustment.sorting import SortedObservations
 
@@ -180,7 +181,7 @@ class Model:
             at.visual, seen.starts, seen.slots, damping, out.poses, out.gradient, out.diagonal
         )
         if self.inertial:
-            _add_motions(
+            inertial_residuals.add_motions(
                 self.motions.firsts,
                 self.slots,
                 at.motion_residuals,
@@ -192,7 +193,7 @@ class Model:
                 out.gradient,
                 out.diagonal,
             )
-        _add_priors(
+        priors.add_priors(
             self.sharpness,
             self.slots,
             at.prior_residuals,
@@ -217,89 +218,6 @@ class Model:
 
 
 @njit(cache=True, error_model="numpy")
-def _place(slot: int, moving: int, n: int) -> int:
-    """Where number n of a keyframe's 15 stands among the unknowns."""
-    return 6 * slot + n if n < 6 else 6 * moving + 9 * slot + n - 6
-
-
-@njit(cache=True, error_model="numpy")
-def _add_motions(
-    firsts: NDArray,
-    slots: NDArray,
-    residual: NDArray,
-    jacobian: NDArray,
-    poses: NDArray,
-    chain: NDArray,
-    links: NDArray,
-    coupling: NDArray,
-    gradient: NDArray,
-    diagonal: NDArray,
-) -> None:
-    """Add J'J and J'r of the inertial factors."""
-    moving = len(chain)
-    for f in range(len(firsts)):
-        transposed = np.ascontiguousarray(jacobian[f].T)
-        product = transposed @ jacobian[f]
-        toward = transposed @ residual[f]
-        for one in range(2):
-            s, i = slots[firsts[f] + one], 15 * one
-            if s < 0:
-                continue
-            chain[s] += product[i + 6 : i + 15, i + 6 : i + 15]
-            for n in range(15):
-                at = _place(s, moving, n)
-                gradient[at] += toward[i + n]
-                diagonal[at] += product[i + n, i + n]
-            for other in range(2):
-                t, j = slots[firsts[f] + other], 15 * other
-                if t < 0:
-                    continue
-                # Neighbours in time have neighbouring slots.
-                c = 6 * (t - s + 1)
-                coupling[s, :, c : c + 6] += product[i + 6 : i + 15, j : j + 6]
-                if t >= s:
-                    pose, next_pose = 6 * s, 6 * t
-                    poses[pose : pose + 6, next_pose : next_pose + 6] += product[
-                        i : i + 6, j : j + 6
-                    ]
-                if t > s:
-                    links[s] += product[i + 6 : i + 15, j + 6 : j + 15]
-
-
-@njit(cache=True, error_model="numpy")
-def _add_priors(
-    sharpness: NDArray,
-    slots: NDArray,
-    residual: NDArray,
-    headings: NDArray,
-    poses: NDArray,
-    chain: NDArray,
-    gradient: NDArray,
-    diagonal: NDArray,
-) -> None:
-    """Add J'J and J'r of the priors."""
-    for k in range(len(slots)):
-        if slots[k] < 0:
-            continue
-        s, turn = slots[k], 6 * slots[k]
-        for i in range(3):
-            gradient[turn + i] += headings[k, i] * residual[k, 3]
-            diagonal[turn + i] += headings[k, i] ** 2
-            for j in range(i, 3):
-                poses[turn + i, turn + j] += headings[k, i] * headings[k, j]
-        for n in range(12 if len(chain) else 3):
-            row = n if n < 3 else n + 1
-            at = _place(s, len(chain), 3 + n)
-            information = sharpness[k, row] ** 2
-            gradient[at] += sharpness[k, row] * residual[k, row]
-            diagonal[at] += information
-            if n < 3:
-                poses[at, at] += information
-            else:
-                chain[s, n - 3, n - 3] += information
-
-
-@njit(cache=True, error_model="numpy")
 def _move_keyframes(
     slots: NDArray,
     moving: int,
@@ -317,4 +235,4 @@ def _move_keyframes(
         # One Newton step toward the nearest rotation: products drift away from it.
         rotations[k] = turned @ (1.5 * np.eye(3) - 0.5 * (turned.T @ turned))
         for n in range(12 if inertial else 3):
-            vectors[k, n] += step[_place(slot, moving, 3 + n)]
+            vectors[k, n] += step[place(slot, moving, 3 + n)]

@@ -7,6 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from airground.slam import so3
+from airground.slam.bundle_adjustment.chain import place
 from airground.slam.bundle_adjustment.problem import Role, Settings, States
 
 ROWS = 13
@@ -84,3 +85,36 @@ def linearize_priors(
             residual[4 + n] = sharp[4 + n] * vectors[k, 3 + n]
         total += 0.5 * np.dot(residual, residual)
     return total
+
+
+@njit(cache=True, error_model="numpy")
+def add_priors(
+    sharpness: NDArray,
+    slots: NDArray,
+    residual: NDArray,
+    headings: NDArray,
+    poses: NDArray,
+    chain: NDArray,
+    gradient: NDArray,
+    diagonal: NDArray,
+) -> None:
+    """Add J'J and J'r of the priors."""
+    for k in range(len(slots)):
+        if slots[k] < 0:
+            continue
+        s, turn = slots[k], 6 * slots[k]
+        for i in range(3):
+            gradient[turn + i] += headings[k, i] * residual[k, 3]
+            diagonal[turn + i] += headings[k, i] ** 2
+            for j in range(i, 3):
+                poses[turn + i, turn + j] += headings[k, i] * headings[k, j]
+        for n in range(12 if len(chain) else 3):
+            row = n if n < 3 else n + 1
+            at = place(s, len(chain), 3 + n)
+            information = sharpness[k, row] ** 2
+            gradient[at] += sharpness[k, row] * residual[k, row]
+            diagonal[at] += information
+            if n < 3:
+                poses[at, at] += information
+            else:
+                chain[s, n - 3, n - 3] += information

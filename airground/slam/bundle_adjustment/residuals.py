@@ -49,6 +49,17 @@ def camera_poses(
 
 
 @njit(cache=True, error_model="numpy", fastmath=FASTMATH)
+def _into_camera(turn: NDArray, point: NDArray, centre: NDArray) -> tuple[float, float, float]:
+    """A point of the map in a camera that stands at `centre`."""
+    x, y, z = point[0] - centre[0], point[1] - centre[1], point[2] - centre[2]
+    return (
+        turn[0, 0] * x + turn[0, 1] * y + turn[0, 2] * z,
+        turn[1, 0] * x + turn[1, 1] * y + turn[1, 2] * z,
+        turn[2, 0] * x + turn[2, 1] * y + turn[2, 2] * z,
+    )
+
+
+@njit(cache=True, error_model="numpy", fastmath=FASTMATH)
 def _row(scale: float, along: NDArray, tangent: float, axis: NDArray) -> tuple[float, float, float]:
     """One row of A: how a pixel coordinate follows the point."""
     return (
@@ -56,6 +67,20 @@ def _row(scale: float, along: NDArray, tangent: float, axis: NDArray) -> tuple[f
         scale * (along[1] - tangent * axis[1]),
         scale * (along[2] - tangent * axis[2]),
     )
+
+
+@njit(cache=True, error_model="numpy", fastmath=FASTMATH)
+def _store(row: NDArray, a: tuple, b: tuple, c: tuple, error: tuple, w: float, q: float) -> None:
+    """A'WA and A'Wr, A of the rows a and b of weight w and c of weight q, r weighted."""
+    row[0] = w * (a[0] * a[0] + b[0] * b[0]) + q * c[0] * c[0]
+    row[1] = w * (a[0] * a[1] + b[0] * b[1]) + q * c[0] * c[1]
+    row[2] = w * (a[0] * a[2] + b[0] * b[2]) + q * c[0] * c[2]
+    row[3] = w * (a[1] * a[1] + b[1] * b[1]) + q * c[1] * c[1]
+    row[4] = w * (a[1] * a[2] + b[1] * b[2]) + q * c[1] * c[2]
+    row[5] = w * (a[2] * a[2] + b[2] * b[2]) + q * c[2] * c[2]
+    row[6] = a[0] * error[0] + b[0] * error[1] + c[0] * error[2]
+    row[7] = a[1] * error[0] + b[1] * error[1] + c[1] * error[2]
+    row[8] = a[2] * error[0] + b[2] * error[1] + c[2] * error[2]
 
 
 @njit(cache=True, error_model="numpy", fastmath=FASTMATH)
@@ -90,12 +115,7 @@ def linearize(
     for m in range(len(keyframes)):
         k, j = keyframes[m], points_seen[m]
         r = R_camera_map[k]
-        ex = points[j, 0] - centres[k, 0]
-        ey = points[j, 1] - centres[k, 1]
-        ez = points[j, 2] - centres[k, 2]
-        x = r[0, 0] * ex + r[0, 1] * ey + r[0, 2] * ez
-        y = r[1, 0] * ex + r[1, 1] * ey + r[1, 2] * ez
-        z = r[2, 0] * ex + r[2, 1] * ey + r[2, 2] * ez
+        x, y, z = _into_camera(r, points[j], centres[k])
         row = out[m]
         if not z > MIN_DEPTH:
             row[:] = 0.0
@@ -109,28 +129,17 @@ def linearize(
         cost, weight = huber(eu * eu + ev * ev, threshold)
         total += cost
         su, sv = fx * inverse * sharpness, fy * inverse * sharpness
-        a0, a1, a2 = _row(su, r[0], u, r[2])
-        b0, b1, b2 = _row(sv, r[1], v, r[2])
-        c0 = c1 = c2 = ed = depth_weight = 0.0
+        a, b = _row(su, r[0], u, r[2]), _row(sv, r[1], v, r[2])
+        c, ed, depth_weight = (0.0, 0.0, 0.0), 0.0, 0.0
         if not np.isnan(measured[m, 3]):
             ed = (inverse - measured[m, 3]) * measured[m, 4]
             cost, depth_weight = huber(ed * ed, threshold)
             total += cost
             scale = -inverse * inverse * measured[m, 4]
-            c0, c1, c2 = scale * r[2, 0], scale * r[2, 1], scale * r[2, 2]
-        w, q = weight, depth_weight
-        row[0] = w * (a0 * a0 + b0 * b0) + q * c0 * c0
-        row[1] = w * (a0 * a1 + b0 * b1) + q * c0 * c1
-        row[2] = w * (a0 * a2 + b0 * b2) + q * c0 * c2
-        row[3] = w * (a1 * a1 + b1 * b1) + q * c1 * c1
-        row[4] = w * (a1 * a2 + b1 * b2) + q * c1 * c2
-        row[5] = w * (a2 * a2 + b2 * b2) + q * c2 * c2
-        row[6] = w * (a0 * eu + b0 * ev) + q * c0 * ed
-        row[7] = w * (a1 * eu + b1 * ev) + q * c1 * ed
-        row[8] = w * (a2 * eu + b2 * ev) + q * c2 * ed
-        row[9] = points[j, 0] - positions[k, 0]
-        row[10] = points[j, 1] - positions[k, 1]
-        row[11] = points[j, 2] - positions[k, 2]
+            c = (scale * r[2, 0], scale * r[2, 1], scale * r[2, 2])
+        _store(row, a, b, c, (weight * eu, weight * ev, depth_weight * ed), weight, depth_weight)
+        for n in range(3):
+            row[9 + n] = points[j, n] - positions[k, n]
     return total
 
 
@@ -148,12 +157,7 @@ def reprojection_errors_px(
     errors = np.full(len(keyframes), np.nan)
     for m in range(len(keyframes)):
         k, j = keyframes[m], points_seen[m]
-        x, y, z = 0.0, 0.0, 0.0
-        for n in range(3):
-            offset = points[j, n] - centres[k, n]
-            x += R_camera_map[k, 0, n] * offset
-            y += R_camera_map[k, 1, n] * offset
-            z += R_camera_map[k, 2, n] * offset
+        x, y, z = _into_camera(R_camera_map[k], points[j], centres[k])
         if z > MIN_DEPTH:
             right = camera[0] * x / z + camera[2] - pixels[m, 0]
             down = camera[1] * y / z + camera[3] - pixels[m, 1]

@@ -63,8 +63,10 @@ def _cross(
 
 
 @njit(cache=True, error_model="numpy", fastmath=FASTMATH)
-def _times_symmetric(v0: float, v1: float, v2: float, row: NDArray) -> tuple[float, float, float]:
-    """v' B for the B that begins `row`."""
+def _times_symmetric(
+    v0: float, v1: float, v2: float, row: NDArray | tuple
+) -> tuple[float, float, float]:
+    """v' B for the symmetric B (xx, xy, xz, yy, yz, zz) that begins `row`."""
     return (
         v0 * row[0] + v1 * row[1] + v2 * row[2],
         v0 * row[1] + v1 * row[3] + v2 * row[4],
@@ -152,22 +154,17 @@ def eliminate_points(
         if first == stop:
             continue
         i00, i01, i02, i11, i12, i22, g0, g1, g2 = _point_block(linear, start, stop, damping)
+        inverse = (i00, i01, i02, i11, i12, i22)
         for a in range(first, stop):
             one = linear[a]
             s = 6 * slots[a]
             d = (one[9], one[10], one[11])
             _add_diagonal(diagonal, s, one)
-            # Y = B times the inverse, row by row.
             b0, b1, b2, b3, b4, b5 = one[0], one[1], one[2], one[3], one[4], one[5]
-            y00 = b0 * i00 + b1 * i01 + b2 * i02
-            y01 = b0 * i01 + b1 * i11 + b2 * i12
-            y02 = b0 * i02 + b1 * i12 + b2 * i22
-            y10 = b1 * i00 + b3 * i01 + b4 * i02
-            y11 = b1 * i01 + b3 * i11 + b4 * i12
-            y12 = b1 * i02 + b3 * i12 + b4 * i22
-            y20 = b2 * i00 + b4 * i01 + b5 * i02
-            y21 = b2 * i01 + b4 * i11 + b5 * i12
-            y22 = b2 * i02 + b4 * i12 + b5 * i22
+            # Y = B times the inverse, row by row.
+            y00, y01, y02 = _times_symmetric(b0, b1, b2, inverse)
+            y10, y11, y12 = _times_symmetric(b1, b3, b4, inverse)
+            y20, y21, y22 = _times_symmetric(b2, b4, b5, inverse)
             h0 = one[6] - (y00 * g0 + y01 * g1 + y02 * g2)
             h1 = one[7] - (y10 * g0 + y11 * g1 + y12 * g2)
             h2 = one[8] - (y20 * g0 + y21 * g1 + y22 * g2)
