@@ -254,18 +254,20 @@ def _cast(
     depth, hit, grey = np.empty(n), np.zeros(n, np.int64), np.empty(n)
     for i in range(n):
         nearest, axis, box = np.inf, 0, 0
+        inverse = 1.0 / rays[i]
         for b in range(len(boxes)):
             enter, leave, enter_axis, leave_axis = -np.inf, np.inf, 0, 0
             for k in range(3):
-                inverse = 1.0 / rays[i, k]
-                t0 = (boxes[b, 0, k] - start[k]) * inverse
-                t1 = (boxes[b, 1, k] - start[k]) * inverse
+                t0 = (boxes[b, 0, k] - start[k]) * inverse[k]
+                t1 = (boxes[b, 1, k] - start[k]) * inverse[k]
                 if t0 > t1:
                     t0, t1 = t1, t0
                 if t0 > enter:
                     enter, enter_axis = t0, k
                 if t1 < leave:
                     leave, leave_axis = t1, k
+                if enter > leave:
+                    break
             if b == 0 and leave < nearest:  # one is inside the room
                 nearest, axis, box = leave, leave_axis, b
             elif b > 0 and 0 < enter < leave and enter < nearest:
