@@ -8,13 +8,19 @@ from numpy.typing import NDArray
 
 QUALITY = 2e-4
 """Smallest eigenvalue of a corner's gradient matrix: below it, noise is as strong."""
+NOT_PREFERRED = 0.03
+"""What a corner without depth is worth: it only helps when nothing better is near."""
 BLOCK_PX = 5
 BORDER_PX = 12
 """No corner so close to the border: the patch around it would leave the image."""
 
 
 def detect_corners(
-    image: NDArray[np.uint8], occupied: NDArray[np.float32], wanted: int, spacing_px: int
+    image: NDArray[np.uint8],
+    occupied: NDArray[np.float32],
+    wanted: int,
+    spacing_px: int,
+    preferred: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.float32]:
     """The strongest corners, one a cell of a grid, where none is followed yet.
 
@@ -25,6 +31,7 @@ def detect_corners(
         image: (height, width) grey.
         occupied: (N, 2) pixels of the corners that are followed already.
         wanted: At most this many new ones, the strongest cells first.
+        preferred: (height, width) where corners are worth more, having depth.
         spacing_px: Side of a cell; also the least distance to an occupied pixel.
 
     Returns:
@@ -35,6 +42,8 @@ def detect_corners(
     strength = cv2.cornerMinEigenVal(image, BLOCK_PX, ksize=3)
     strength[:BORDER_PX] = strength[-BORDER_PX:] = 0
     strength[:, :BORDER_PX] = strength[:, -BORDER_PX:] = 0
+    if preferred is not None:
+        strength *= np.where(preferred, 1.0, NOT_PREFERRED).astype(np.float32)
     for x, y in occupied:
         cv2.circle(strength, (round(float(x)), round(float(y))), spacing_px, (0.0,), -1)
     rows, columns = (size // spacing_px for size in image.shape)

@@ -90,7 +90,6 @@ def _consensus(
             points_map, pixels, camera, predicted.rotation, RANSAC_THRESHOLD_PX, RANSAC_ROUNDS, rng
         )
     T_camera_map = predicted.inverse()
-    cv2.setRNGSeed(int(rng.integers(2**31)))
     found, turn, shift, rows = cv2.solvePnPRansac(
         points_map,
         pixels,

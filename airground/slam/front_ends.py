@@ -10,6 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
+import numpy as np
+
 from airground.config import Config
 from airground.core.messages import GroundImage, MavImage, RobotCalibration
 from airground.core.trajectory import Trajectory
@@ -29,11 +31,13 @@ class Ingredients:
     Attributes:
         calibration: Of the robot.
         config: The whole pipeline's.
+        rng: Draws samples wherever outliers are to be told.
         trajectory: Poses `T_map_camera` of an external system; None where there are none.
     """
 
     calibration: RobotCalibration
     config: Config
+    rng: np.random.Generator
     trajectory: Trajectory | None = None
 
     def given_trajectory(self) -> Trajectory:
@@ -48,13 +52,13 @@ class Ingredients:
 
 
 MAV: dict[str, Callable[[Ingredients], FrontEnd[MavImage]]] = {
-    "slam": lambda given: MonocularSlam(given.calibration, given.config),
+    "slam": lambda given: MonocularSlam(given.calibration, given.config, given.rng),
     "file": lambda given: TrajectoryFile(given.given_trajectory()),
 }
 """Of the MAV: grey images and IMU."""
 
 GROUND: dict[str, Callable[[Ingredients], FrontEnd[GroundImage]]] = {
-    "slam": lambda given: RgbdSlam(given.calibration, given.config),
+    "slam": lambda given: RgbdSlam(given.calibration, given.config, given.rng),
     "open3d": lambda given: open3d_odometry(given.calibration),
     "opencv": lambda given: opencv_odometry(given.calibration),
     "file": lambda given: TrajectoryFile(given.given_trajectory()),

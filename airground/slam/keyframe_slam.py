@@ -15,22 +15,26 @@ from airground.config import KeyframeSlam as Parameters
 from airground.core.messages import ImuSamples, RobotCalibration
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
+from airground.slam import so3
 from airground.slam.depth_lookup import inverse_depths_at
 from airground.slam.feature_tracker import FeatureTracker
 from airground.slam.frame import Frame
 from airground.slam.frame_pose import frame_pose
 from airground.slam.geometry.pose_estimation import PoseFit
+from airground.slam.image_turn import ImageTurn
 from airground.slam.inertial.alignment import InertialAlignment
 from airground.slam.local_mapping import LocalMapper, NewKeyframe
 from airground.slam.map_adjustment import MapAdjuster
-from airground.slam.recovery import Recovery
 from airground.slam.motion_model import MotionModel, Prediction
+from airground.slam.recovery import Recovery
 from airground.slam.rig_state import RigState
 from airground.slam.sparse_map import SparseMap
 from airground.slam.starts import MovingStart
 
 PATIENCE = 2
 """A point that fits the pose badly in this many images in a row is given up."""
+GUIDED_LEVELS, UNGUIDED_LEVELS = 1, 3
+"""Pyramid levels above the image: a gyro tells where corners go, constant motion guesses."""
 MAX_COAST_S = 3.0
 """Inertial dead reckoning without a look at the scene drifts by centimetres in this time."""
 FIRST_GLOBAL_ADJUSTMENT = 8
@@ -48,6 +52,7 @@ class KeyframeSlam:
     Args:
         calibration: Of the robot.
         parameters: Its section of the configuration.
+        rng: Draws samples wherever outliers are to be told.
         inverse_depth_sigma: Noise of measured inverse depth [1/m].
         max_depth_m: Depth beyond this starts no point.
 
@@ -66,16 +71,19 @@ class KeyframeSlam:
         self,
         calibration: RobotCalibration,
         parameters: Parameters,
+        rng: np.random.Generator,
         inverse_depth_sigma: float = 1.0,
         max_depth_m: float = np.inf,
     ) -> None:
         self.calibration, self.parameters = calibration, parameters
         self.camera, self.T_rig_camera = calibration.camera, calibration.T_imu_camera
         self.motion = MotionModel(calibration.imu, calibration.camera_time_offset_ns)
-        self.tracker = FeatureTracker(parameters.patch_px, levels=1)
+        levels = GUIDED_LEVELS if calibration.imu is not None else UNGUIDED_LEVELS
+        self.tracker = FeatureTracker(parameters.patch_px, levels)
+        self._image_turn = ImageTurn(self.camera) if calibration.imu is None else None
         self.metric = self.inertial = False
         self._inverse_depth_sigma, self._max_depth_m = inverse_depth_sigma, max_depth_m
-        self._rng = np.random.default_rng(0)
+        self._rng = rng
         self._tracked: list[tuple[int, int, SE3]] = []
         self.reset()
 
@@ -143,8 +151,9 @@ class KeyframeSlam:
             the map was adjusted as a whole.
         """
         assert self.stamp_ns is not None
+        turn = self._guessed_turn(frame)
         prediction = self.motion.predict(
-            self.state, self._turn, self.stamp_ns, frame.stamp_ns, self.inertial
+            self.state, turn, self.stamp_ns, frame.stamp_ns, self.inertial
         )
         lost = self._seen_ns != self.stamp_ns
         self.tracker.advance(frame.image, self._expected(prediction), 2 if lost else 0)
@@ -220,6 +229,15 @@ class KeyframeSlam:
         low, high = np.percentile(z, [DEPTH_RANGE_PERCENT, 100 - DEPTH_RANGE_PERCENT])
         return (float(low), float(high)) if low > 0 else None
 
+    def _guessed_turn(self, frame: Frame) -> NDArray[np.float64]:
+        """(3, 3) turn of the rig to the next image, for want of a gyro."""
+        slide = None if self._image_turn is None else self._image_turn.follow(frame.image)
+        if slide is None:
+            return self._turn
+        R = self.T_rig_camera.rotation
+        about = so3.log(R.T @ self._turn @ R)
+        return R @ so3.exp(np.array([slide[0], slide[1], about[2]])) @ R.T
+
     def _expected(self, prediction: Prediction) -> NDArray[np.float64]:
         """(N, 2) where the corners should be: map points by their place, others by a guess."""
         if len(self.tracker.ids) == 0:
@@ -275,7 +293,8 @@ class KeyframeSlam:
         """Look for the map where it should be, then anywhere."""
         if not self._tracked:
             return None
-        found = self._recovery.near(frame.image, prediction) or self._recovery.anywhere(frame.image)
+        expected = prediction.state.pose() @ self.T_rig_camera
+        found = self._recovery.near(frame.image, expected) or self._recovery.anywhere(frame.image)
         if found is None:
             return None
         self.tracker.clear()
@@ -305,18 +324,22 @@ class KeyframeSlam:
         """Whether this image shows enough that the last keyframe did not."""
         last, parameters = self.map.keyframes[-1], self.parameters
         order = np.argsort(last.ids)
-        place = np.searchsorted(last.ids, self.tracker.ids, sorter=order).clip(
-            0, len(last.ids) - 1
-        )
+        place = np.searchsorted(last.ids, self.tracker.ids, sorter=order).clip(0, len(last.ids) - 1)
         rows = order[place] if len(order) else np.empty(0, np.int64)
         common = last.ids[rows] == self.tracker.ids if len(order) else np.zeros(0, bool)
         if common.sum() < parameters.keyframe_share * len(last.ids):
+            return True
+        placed = self.map.mapped(last.ids)
+        if self.map.mapped(self.tracker.ids).sum() < parameters.keyframe_share * placed.sum():
             return True
         if self.motion.buffer is not None and self.metric:
             seconds = (stamp_ns - last.stamp_ns) * 1e-9
             if seconds >= parameters.keyframe_interval_s:
                 return True
-        moved = self._unturned(self.tracker.pixels[common], last.state.rotation) - last.pixels[rows[common]]
+        moved = (
+            self._unturned(self.tracker.pixels[common], last.state.rotation)
+            - last.pixels[rows[common]]
+        )
         parallax = np.linalg.norm(moved, axis=1)
         return bool(len(parallax)) and float(np.median(parallax)) > parameters.keyframe_parallax_px
 

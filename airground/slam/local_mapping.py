@@ -213,7 +213,11 @@ class LocalMapper:
         """Follow new corners where there are none; with depth they are in the map at once."""
         wanted = self._parameters.corners - len(self._tracker.ids)
         corners = detect_corners(
-            new.image, self._tracker.pixels, wanted, self._parameters.corner_spacing_px
+            new.image,
+            self._tracker.pixels,
+            wanted,
+            self._parameters.corner_spacing_px,
+            None if new.depth is None else new.depth <= self._max_depth_m,
         )
         pixels = corners.astype(np.float64)
         ids = self._map.new_points(pixels, index)

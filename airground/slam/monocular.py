@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from airground.config import Config
 from airground.core.messages import ImuSamples, MavImage, RobotCalibration
 from airground.core.trajectory import Trajectory
-from airground.slam.front_end import ScaleEstimate, TrackedPose, Tracking
 from airground.slam.frame import Frame
+from airground.slam.front_end import TrackedPose, Tracking
 from airground.slam.keyframe_slam import KeyframeSlam
 from airground.slam.metric_scale import MetricScale
 from airground.slam.starts import RestStart, TwoViewWait
@@ -27,13 +29,17 @@ class MonocularSlam:
     Args:
         calibration: What is known about the robot's sensors.
         config: The whole pipeline's; the section `monocular_slam` is used.
+        rng: Draws samples wherever outliers are to be told.
     """
 
-    def __init__(self, calibration: RobotCalibration, config: Config) -> None:
-        self._slam = KeyframeSlam(calibration, config.monocular_slam)
+    def __init__(
+        self, calibration: RobotCalibration, config: Config, rng: np.random.Generator
+    ) -> None:
+        slam_rng, start_rng = rng.spawn(2)
+        self._slam = KeyframeSlam(calibration, config.monocular_slam, slam_rng)
         self._scale = MetricScale(self._slam)
         self._rest = RestStart(calibration)
-        self._two_views = TwoViewWait(calibration, config.monocular_slam)
+        self._two_views = TwoViewWait(calibration, config.monocular_slam, start_rng)
         self._given_out = False
 
     def add_imu(self, samples: ImuSamples) -> None:
@@ -90,6 +96,4 @@ class MonocularSlam:
             self._slam.begin_moving(moving)
 
     def _initializing(self, frame: Frame) -> TrackedPose:
-        return TrackedPose(
-            frame.stamp_ns, Tracking.INITIALIZING, None, scale=self._scale.estimate
-        )
+        return TrackedPose(frame.stamp_ns, Tracking.INITIALIZING, None, scale=self._scale.estimate)

@@ -12,7 +12,6 @@ from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam.geometry.pose_estimation import PoseFit, estimate_pose
 from airground.slam.geometry.relocalization import KeyframeIndex
-from airground.slam.motion_model import Prediction
 from airground.slam.reacquisition import find_again, keyframes_in_view, visible
 from airground.slam.sparse_map import SparseMap
 
@@ -65,9 +64,8 @@ class Recovery:
         keyframe = self._map.keyframes[number]
         self._index.add(number, keyframe.image, keyframe.ids, keyframe.pixels)
 
-    def near(self, image: NDArray[np.uint8], prediction: Prediction) -> Found | None:
-        """Look where the map should be by the prediction."""
-        T_map_camera = prediction.state.pose() @ self._T_rig_camera
+    def near(self, image: NDArray[np.uint8], T_map_camera: SE3) -> Found | None:
+        """Look where the map should be if the camera is about there."""
         count = len(self._map.keyframes)
         ids = self._map.seen_by(list(range(count)))
         expected, inside = visible(self._map.positions[ids], T_map_camera, self._camera)
@@ -92,10 +90,13 @@ class Recovery:
 
     def anywhere(self, image: NDArray[np.uint8]) -> Found | None:
         """Compare the image with all keyframes."""
-        found = self._index.find(image, self._camera, lambda ids: self._map.positions[ids])
-        if found is None:
-            return None
-        return self._agreed(found.ids, found.pixels, found.T_map_camera)
+        found = self._index.find(image, self._camera, self._places)
+        # Descriptors find the place, patches the pixel.
+        return None if found is None else self.near(image, found.fit.T_map_camera)
+
+    def _places(self, ids: NDArray[np.int64]) -> NDArray[np.float64]:
+        """(n, 3) positions of points, NaN where they have none."""
+        return np.where(self._map.mapped(ids)[:, None], self._map.positions[ids], np.nan)
 
     def _agreed(self, ids: NDArray, pixels: NDArray, T_map_camera: SE3) -> Found | None:
         """The pose by points that were found, if they agree."""

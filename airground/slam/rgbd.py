@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import cv2
+import numpy as np
 
 from airground.config import Config
 from airground.core.messages import GroundImage, ImuSamples, RobotCalibration
 from airground.core.trajectory import Trajectory
-from airground.slam.front_end import TrackedPose, Tracking
 from airground.slam.frame import Frame
+from airground.slam.front_end import TrackedPose, Tracking
 from airground.slam.keyframe_slam import KeyframeSlam
 from airground.slam.starts import level_start
 
@@ -25,12 +26,15 @@ class RgbdSlam:
     Args:
         calibration: What is known about the robot's sensors.
         config: The whole pipeline's; the section `rgbd_slam` is used.
+        rng: Draws samples wherever outliers are to be told.
     """
 
-    def __init__(self, calibration: RobotCalibration, config: Config) -> None:
+    def __init__(
+        self, calibration: RobotCalibration, config: Config, rng: np.random.Generator
+    ) -> None:
         parameters = config.rgbd_slam
         self._slam = KeyframeSlam(
-            calibration, parameters, parameters.depth_noise_per_m, parameters.max_depth_m
+            calibration, parameters, rng, parameters.depth_noise_per_m, parameters.max_depth_m
         )
         self._slam.metric = True
 

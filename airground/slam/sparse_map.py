@@ -114,9 +114,7 @@ class SparseMap:
         wanted[ids] = True
         return np.array([int(wanted[keyframe.ids].sum()) for keyframe in self.keyframes])
 
-    def move(
-        self, scale: float, rotation: NDArray[np.float64], lever: NDArray[np.float64]
-    ) -> None:
+    def move(self, scale: float, rotation: NDArray[np.float64], lever: NDArray[np.float64]) -> None:
         """Scale and turn the whole map about its origin.
 
         Args:

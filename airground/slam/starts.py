@@ -113,12 +113,15 @@ class TwoViewWait:
     Args:
         calibration: Of the robot.
         parameters: Of its SLAM.
+        rng: Draws samples of the matches.
     """
 
-    def __init__(self, calibration: RobotCalibration, parameters: KeyframeSlam) -> None:
+    def __init__(
+        self, calibration: RobotCalibration, parameters: KeyframeSlam, rng: np.random.Generator
+    ) -> None:
         self._calibration, self._parameters = calibration, parameters
         self._tracker = FeatureTracker(parameters.patch_px, START_LEVELS)
-        self._rng = np.random.default_rng(0)
+        self._rng = rng
         self._first: Frame | None = None
         self._corners = np.empty((0, 2), np.float32)
 
@@ -159,9 +162,7 @@ class TwoViewWait:
         self._tracker.add(np.arange(len(self._corners)), self._corners)
         self._first = frame
 
-    def _turn(
-        self, motion: MotionModel, first: Frame, second: Frame
-    ) -> NDArray[np.float64] | None:
+    def _turn(self, motion: MotionModel, first: Frame, second: Frame) -> NDArray[np.float64] | None:
         """(3, 3) turn of the rig between two images, by the gyro."""
         moved = motion.preintegrate(first.stamp_ns, second.stamp_ns, RigState.at_origin())
         return None if moved is None else moved.rotation

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import numpy as np
 from tyro.conf import arg
 
 from airground.errors import InputError
@@ -58,7 +59,9 @@ class AloneWords:
         with fresh_folder(out) as folder:
             recording = open_robot(recording_path, robot, self.calibration)
             true_pose = true_camera(recording)
-            given = front_ends.Ingredients(recording.calibration, config, self._poses())
+            given = front_ends.Ingredients(
+                recording.calibration, config, np.random.default_rng(self.seed), self._poses()
+            )
             front_end: FrontEnd[Any]
             if robot == Source.MAV:
                 front_end = front_ends.make_front_end(front_ends.MAV, self.front_end, given)

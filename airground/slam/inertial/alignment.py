@@ -168,7 +168,7 @@ def refine_scale(
     vectors[:, 1] = np.gradient(vectors[:, 0], seconds, axis=0)
     vectors[:-1, 2], vectors[:-1, 3] = chain.gyro_biases, chain.accelerometer_biases
     vectors[-1, 2:] = vectors[-2, 2:]
-    state = _State(chain.rotations.copy(), vectors, 0.0, GRAVITY_MAP)
+    state = _State(chain.rotations.copy(), vectors, 0.0, GRAVITY_MAP.copy())
     solution = _search(chain, state)
     axis = np.cross(state.gravity, GRAVITY_MAP)
     sine = np.linalg.norm(axis) / GRAVITY**2
@@ -279,8 +279,9 @@ def _chain(
             f"got {len(centres)} and {len(motions)}"
         )
     chain = Chain(
-        np.ascontiguousarray(rotations),
-        np.ascontiguousarray(centres),
+        # Copies, since the kernel would be compiled anew for read-only ones.
+        np.array(rotations, dtype=np.float64, order="C"),
+        np.array(centres, dtype=np.float64, order="C"),
         np.array(T_rig_camera.translation),
         np.zeros(count, bool),
         np.ones(count),

@@ -33,6 +33,9 @@ TILT_SIGMA = 0.2
 """Prior of gravity's direction from one specific force: robots push with 2 m/s^2 [rad]."""
 SURE_SIGMA = 0.2
 """Scale must be known to this share before gravity's direction is worth correcting."""
+SCALE_WALK = 0.01
+"""A visual map's scale drifts [1/sqrt(s)]. It also makes up for what the filter believes too
+easily: the accelerometer's noise drives it, and seems to be motion that shows the scale."""
 ROTATION_GAIN = 0.1
 """Share of vision in the rotation, the rest is the gyro's: turned by vision alone, gravity
 shakes with the visual noise, and a hovering robot seems to move."""
@@ -62,6 +65,7 @@ class ScaleFilter:
         self._gravity: NDArray[np.float64] | None = None
         self._rotation: NDArray[np.float64] | None = None
         self._images = 0
+        self._anchored = False
         self._surprise = 1.0
 
     @property
@@ -121,6 +125,8 @@ class ScaleFilter:
             self._forget_motion(centre)
             self._rotation, self._images = np.array(rotation), 1
         self._update(self._rotation, centre)
+        if not self._anchored and self.sigma < SURE_SIGMA:
+            self._anchor_bias()
         self._turn_gravity()
 
     def _forget_motion(self, centre: NDArray[np.float64]) -> None:
@@ -155,6 +161,7 @@ class ScaleFilter:
         swing = np.concatenate([so3.hat(moved), so3.hat(sped)])
         noise[:6, :6] = turn @ motion.covariance[np.ix_(order, order)] @ turn.T
         noise[:6, :6] += self._noise.rotation_sigma**2 * swing @ swing.T
+        noise[UNIT, UNIT] = SCALE_WALK**2 * t
         noise[BIAS, BIAS] = motion.accelerometer_bias_sigma**2 * np.eye(3)
         self._mean = F @ self._mean
         # The unit's expected square: while it is open, its mean may be near zero by chance.
@@ -166,15 +173,26 @@ class ScaleFilter:
         H = np.zeros((3, SIZE))
         H[:, POSITION] = np.eye(3)
         H[:, UNIT] = rotation @ self._lever
-        white = self._noise.position_sigma**2 * np.eye(3)
-        innovation = centre - H @ self._mean
+        surprise = self._measure(H, centre, self._noise.position_sigma)
+        self._surprise += (surprise - self._surprise) / MEMORY
+
+    def _anchor_bias(self) -> None:
+        """Say again how large the bias may be, now that the unit it was said in is known."""
+        H = np.zeros((3, SIZE))
+        H[:, BIAS] = np.eye(3)
+        self._measure(H, np.zeros(3), ACCELEROMETER_BIAS_SIGMA * self._mean[UNIT])
+        self._anchored = True
+
+    def _measure(self, H: NDArray[np.float64], value: NDArray[np.float64], sigma: float) -> float:
+        """Take in three numbers; returns their normalized innovation squared, by three."""
+        white = sigma**2 * np.eye(3)
+        innovation = value - H @ self._mean
         S = H @ self._covariance @ H.T + white
         gain = np.linalg.solve(S, H @ self._covariance).T
         self._mean = self._mean + gain @ innovation
         keep = np.eye(SIZE) - gain @ H
         self._covariance = keep @ self._covariance @ keep.T + gain @ white @ gain.T
-        surprise = float(innovation @ np.linalg.solve(S, innovation)) / 3.0
-        self._surprise += (surprise - self._surprise) / MEMORY
+        return float(innovation @ np.linalg.solve(S, innovation)) / 3.0
 
     def _turn_gravity(self) -> None:
         """Put the tilt that was found into gravity's direction, so that it stays small."""

@@ -1,0 +1,48 @@
+"""How the camera turned between two images, by the images alone.
+
+For robots without a gyro: the small blurred image slides as a whole when the camera turns
+(Klein and Murray, "Improving the agility of keyframe-based SLAM", ECCV 2008).
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.camera import PinholeCamera
+
+SMALL_WIDTH = 160
+MIN_RESPONSE = 0.05
+"""Share of the correlation's energy in its peak; less says nothing."""
+
+
+class ImageTurn:
+    """Follows the turn from image to image.
+
+    Args:
+        camera: Of the images.
+    """
+
+    def __init__(self, camera: PinholeCamera) -> None:
+        self._camera = camera
+        self._factor = max(1, round(camera.width / SMALL_WIDTH))
+        size = camera.width // self._factor, camera.height // self._factor
+        self._window = cv2.createHanningWindow(size, cv2.CV_32F)
+        self._last: NDArray[np.float32] | None = None
+
+    def follow(self, image: NDArray[np.uint8]) -> NDArray[np.float64] | None:
+        """(2,) turn since the last image about the camera's x and y axes [rad]; None if unclear."""
+        height, width = self._window.shape
+        small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+        small = small.astype(np.float32)
+        last, self._last = self._last, small
+        if last is None:
+            return None
+        (right, down), response = cv2.phaseCorrelate(last, small, self._window)
+        if response < MIN_RESPONSE:
+            return None
+        # What slides to the right was left of where the camera looks now.
+        about_y = -np.arctan2(right * self._factor, self._camera.fx)
+        about_x = np.arctan2(down * self._factor, self._camera.fy)
+        return np.array([about_x, about_y])
