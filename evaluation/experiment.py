@@ -17,7 +17,7 @@ from evaluation.showcase import Showcase
 from evaluation.showcase_maker import make_showcase
 from evaluation.surface_error import surface_error
 from evaluation.timing import STAGE_OF
-from evaluation.trajectory_error import trajectory_error
+from evaluation.tracking_quality import add_tracking
 from evaluation.trials import (
     SEQUENCE_LENGTH,
     localize_sequence,
@@ -104,12 +104,8 @@ def _add_run(out: RowWriter, recording: Recording, maps: Maps) -> None:
 
 def _add_trajectories(out: RowWriter, maps: Maps, truth: Truth) -> None:
     true_pose = {"mav": truth.T_world_mav_camera, "ground": truth.T_world_ground_camera}
-    for robot, poses in maps.paths.items():
-        error = trajectory_error(poses, true_pose[robot])
-        out.add("trajectory", f"{robot}_ate_se3_rmse_m", error.se3_rmse_m, "m")
-        out.add("trajectory", f"{robot}_ate_sim3_rmse_m", error.sim3_rmse_m, "m")
-        out.add("trajectory", f"{robot}_scale_error", error.scale_error, "")
-        out.add("trajectory", f"{robot}_path_m", error.path_m, "m")
+    for robot, tracked in maps.tracked.items():
+        add_tracking(out, tracked, true_pose[robot])
 
 
 def _add_surfaces(out: RowWriter, maps: Maps, truth: Truth) -> None:

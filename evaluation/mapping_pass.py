@@ -13,17 +13,15 @@ from airground.core.events import (
     DepthMapMade,
     Event,
     FieldAdded,
-    GroundTracked,
-    MavTracked,
     SurfaceCast,
 )
-from airground.core.se3 import SE3
 from airground.core.surface import DepthMap
 from airground.io.recording import Recording
 from airground.pipeline import Mapping, Sighting, sight
-from evaluation.oracle import oracle_front_ends
+from evaluation.front_ends import front_ends_for
 from evaluation.setups import Setup
 from evaluation.timing import STAGE_OF, timed
+from evaluation.tracking_quality import Tracked
 from sim.truth import Truth
 
 
@@ -35,22 +33,22 @@ class Maps:
         sightings: In order of time, one an aerial surface.
         depth_maps: Of each sighting, the depth maps that were fused.
         durations_ms: Of each timed stage.
-        paths: Every pose that the front ends gave, by robot ("mav", "ground").
+        tracked: What the front ends said, by robot ("mav", "ground").
         processing_s: Wall time of the pass, decoding included.
     """
 
     sightings: list[Sighting] = field(default_factory=list)
     depth_maps: list[list[DepthMap]] = field(default_factory=list)
     durations_ms: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
-    paths: dict[str, list[tuple[int, SE3]]] = field(default_factory=lambda: defaultdict(list))
+    tracked: dict[str, Tracked] = field(default_factory=dict)
     processing_s: float = 0.0
 
 
 def map_recording(recording: Recording, truth: Truth, setup: Setup, seed: int) -> Maps:
     """Run the upper half of Figure 4 over a whole recording."""
     rng = np.random.default_rng([seed, 0])
-    front_ends = oracle_front_ends(recording, truth, setup.noise, rng)
-    mapping = Mapping(setup.config, recording.mav, recording.ground, front_ends)
+    watched = front_ends_for(setup, recording, truth, rng)
+    mapping = Mapping(setup.config, recording.mav, recording.ground, watched.front_ends())
     maps = Maps()
     made: dict[int, DepthMap] = {}
     fused: list[DepthMap] = []
@@ -59,10 +57,6 @@ def map_recording(recording: Recording, truth: Truth, setup: Setup, seed: int) -
         if type(event) in STAGE_OF:
             maps.durations_ms[STAGE_OF[type(event)]].append(duration_ms)
         match event:
-            case MavTracked():
-                maps.paths["mav"].append((event.stamp_ns, event.T_mav_camera))
-            case GroundTracked():
-                maps.paths["ground"].append((event.stamp_ns, event.T_ground_camera))
             case DepthMapMade():
                 made[event.depth_map.stamp_ns] = event.depth_map
             case FieldAdded():
@@ -74,6 +68,7 @@ def map_recording(recording: Recording, truth: Truth, setup: Setup, seed: int) -
                     maps.depth_maps.append(fused)
                 fused = []
     maps.processing_s = time.perf_counter() - started
+    maps.tracked = watched.tracked()
     return maps
 
 

@@ -35,6 +35,7 @@ _DTYPES = {
     "value": "float64",
     "unit": "string",
     "note": "string",
+    "time_s": "float64",
 }
 
 
@@ -44,7 +45,7 @@ class Condition:
 
     Attributes:
         preset: "paper" or "best".
-        poses: "oracle exact", "oracle with drift" or "slam".
+        poses: "slam", "oracle exact", "oracle with drift", or "slam, exact mav" (or ground).
         sensors: "none", "nominal" or "harsh".
         heading: "known" or "search".
         variant: What else differs from the preset, in words; empty when nothing does.
@@ -58,11 +59,17 @@ class Condition:
 
     def parts(self) -> tuple[str, ...]:
         """What it consists of, in words."""
-        poses = {"oracle exact": "exact poses", "oracle with drift": "poses with drift"}
+        poses = {
+            "slam": "poses from SLAM",
+            "oracle exact": "exact poses",
+            "oracle with drift": "poses with drift",
+            "slam, exact mav": "exact poses of the MAV, the ground robot's from SLAM",
+            "slam, exact ground": "exact poses of the ground robot, the MAV's from SLAM",
+        }
         heading = {"known": "heading known", "search": "heading searched"}
         return (
             f"preset {self.preset}" + (f" ({self.variant})" if self.variant else ""),
-            poses.get(self.poses, f"poses from {self.poses}"),
+            poses.get(self.poses, self.poses),
             f"{self.sensors} sensors" if self.sensors != "none" else "noise-free sensors",
             heading.get(self.heading, self.heading),
         )
@@ -102,6 +109,7 @@ class Row:
         sequence, iteration, trial: Which one it was, where that applies; iterations
             count from 1.
         note: Why, in words: the reason of a refusal.
+        time_s: When in the recording, where something is measured over time [s].
     """
 
     scene: str
@@ -116,6 +124,7 @@ class Row:
     iteration: int | None = None
     trial: int | None = None
     note: str = ""
+    time_s: float | None = None
 
     def as_record(self) -> dict[str, object]:
         record = {k: v for k, v in self.__dict__.items() if k != "condition"}

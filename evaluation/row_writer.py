@@ -30,6 +30,7 @@ class RowWriter:
         sequence: int | None = None,
         iteration: int | None = None,
         trial: int | None = None,
+        time_s: float | None = None,
         note: str = "",
     ) -> None:
         """One row; see `Row` for what the words mean."""
@@ -48,6 +49,7 @@ class RowWriter:
                 iteration=iteration,
                 trial=trial,
                 note=note,
+                time_s=time_s,
             )
         )
 

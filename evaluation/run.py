@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -13,21 +14,21 @@ from airground.core.events import (
     Aligned,
     BeliefUpdated,
     Event,
-    GroundTracked,
-    MavTracked,
     SurfaceCast,
 )
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.io.recording import Recording
+from airground.io.tum import write_tum
 from airground.pipeline import Pipeline, Sighting, sight
 from evaluation.experiment import peak_memory_mib
-from evaluation.oracle import oracle_front_ends
+from evaluation.front_ends import front_ends_for
 from evaluation.relation import pose_error
 from evaluation.results import ResultTable
 from evaluation.row_writer import RowWriter
 from evaluation.setups import Setup
 from evaluation.timing import STAGE_OF, timed
+from evaluation.tracking_quality import Tracked, add_tracking
 from sim.truth import Truth
 
 
@@ -37,14 +38,13 @@ class RunResult:
 
     Attributes:
         table: Everything measured.
-        mav, ground: Where the front ends said that the cameras were, in their own maps.
+        tracked: What the front ends said, by robot ("mav", "ground").
         augmented: The augmented map.
         T_ground_mav: The newest accepted alignment; None where none was.
     """
 
     table: ResultTable
-    mav: Trajectory | None
-    ground: Trajectory | None
+    tracked: dict[str, Tracked]
     augmented: AugmentedMap
     T_ground_mav: SE3 | None
 
@@ -56,8 +56,10 @@ def run_recording(recording: Recording, truth: Truth, setup: Setup, seed: int) -
     and every refinement as one trial.
     """
     pose_rng, pipeline_rng = np.random.default_rng(seed).spawn(2)
-    front_ends = oracle_front_ends(recording, truth, setup.noise, pose_rng)
-    pipeline = Pipeline(setup.config, recording.mav, recording.ground, front_ends, pipeline_rng)
+    watched = front_ends_for(setup, recording, truth, pose_rng)
+    pipeline = Pipeline(
+        setup.config, recording.mav, recording.ground, watched.front_ends(), pipeline_rng
+    )
     condition = setup.condition(recording.sensors)
     out = RowWriter(recording.scene, recording.seed, recording.flight, condition)
     measure = _Measure(out, pipeline, truth)
@@ -69,13 +71,33 @@ def run_recording(recording: Recording, truth: Truth, setup: Setup, seed: int) -
     out.add("run", "peak_memory_mib", peak_memory_mib(), "MiB")
     if measure.iterations == 0:
         out.add_no_belief("no aerial map came while both robots knew where they were", 0, 1)
+    tracked = watched.tracked()
+    add_tracking(out, tracked["mav"], truth.T_world_mav_camera)
+    add_tracking(out, tracked["ground"], truth.T_world_ground_camera)
     return RunResult(
         ResultTable.from_rows(out.rows),
-        measure.path(MavTracked),
-        measure.path(GroundTracked),
+        tracked,
         pipeline.augmented_map(),
         measure.T_ground_mav,
     )
+
+
+def write_trajectories(folder: Path, recording: Recording, tracked: dict[str, Tracked]) -> None:
+    """Write `mav.tum` and `ground.tum` as believed at the end, and `*_live.tum` as first said.
+
+    Poses are those of the robot's body, as in the recording's `truth/`, so that
+    `evo_ape tum` compares the files as they are; a robot never tracked has none.
+    """
+    calibrations = {"mav": recording.mav, "ground": recording.ground}
+    for robot, calibration in calibrations.items():
+        T_camera_body = (calibration.T_body_imu @ calibration.T_imu_camera).inverse()
+        ways = {robot: tracked[robot].final_poses()}
+        ways[f"{robot}_live"] = tracked[robot].front_end.live_poses()
+        for name, poses in ways.items():
+            if poses:
+                bodies = [T_map_camera @ T_camera_body for _, T_map_camera in poses]
+                path = Trajectory.from_poses([stamp for stamp, _ in poses], bodies)
+                write_tum(folder / f"{name}.tum", path)
 
 
 class _Measure:
@@ -88,14 +110,9 @@ class _Measure:
         self._out, self._pipeline, self._truth = out, pipeline, truth
         self._belief: Belief | None = None
         self._sighting: Sighting | None = None
-        self._poses: dict[type[Event], list[tuple[int, SE3]]] = {MavTracked: [], GroundTracked: []}
 
     def take(self, event: Event, duration_ms: float) -> None:
         match event:
-            case MavTracked():
-                self._poses[MavTracked].append((event.stamp_ns, event.T_mav_camera))
-            case GroundTracked():
-                self._poses[GroundTracked].append((event.stamp_ns, event.T_ground_camera))
             case SurfaceCast():
                 self._sighting = sight(event.surface, self._pipeline.mapping)
             case BeliefUpdated():
@@ -104,12 +121,6 @@ class _Measure:
                 self._take_alignment(event, duration_ms)
         if type(event) in STAGE_OF and not isinstance(event, Aligned):
             self._out.add("timing", STAGE_OF[type(event)], duration_ms, "ms")
-
-    def path(self, kind: type[Event]) -> Trajectory | None:
-        poses = self._poses[kind]
-        if not poses:
-            return None
-        return Trajectory.from_poses([stamp for stamp, _ in poses], [pose for _, pose in poses])
 
     def _take_belief(self, belief: Belief) -> None:
         self._belief = belief

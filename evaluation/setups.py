@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from airground.config import Config, paper
-from evaluation.oracle import EXACT, PAPER_DRIFT, PoseNoise
+from evaluation.oracle import EXACT, PoseNoise
 from evaluation.results import Condition
+
+Poses = Literal["slam", "oracle", "slam, exact mav", "slam, exact ground"]
+"""Where poses come from: each robot's own SLAM, or the truth for both or one of them."""
+
+ROBOTS = {"mav", "ground"}
 
 
 @dataclass(frozen=True)
@@ -15,19 +21,29 @@ class Setup:
 
     Attributes:
         config: The pipeline's parameters.
+        poses: Where the cameras' poses come from.
         noise: What was added to the oracle's poses.
         variant: What else differs from the preset, in words.
     """
 
     config: Config
+    poses: Poses = "slam"
     noise: PoseNoise = EXACT
     variant: str = ""
 
+    def slam_robots(self) -> frozenset[str]:
+        """Those of "mav" and "ground" whose poses come from SLAM."""
+        without = {"oracle": ROBOTS, "slam, exact mav": {"mav"}, "slam, exact ground": {"ground"}}
+        return frozenset(ROBOTS - without.get(self.poses, set()))
+
     def condition(self, sensors: str) -> Condition:
         """How results name this setup."""
+        poses: str = self.poses
+        if poses == "oracle":
+            poses = "oracle exact" if self.noise == EXACT else "oracle with drift"
         return Condition(
             preset=self.config.preset,
-            poses="oracle exact" if self.noise == EXACT else "oracle with drift",
+            poses=poses,
             sensors=sensors,
             heading=self.config.localization.heading,
             variant=self.variant,
@@ -35,9 +51,11 @@ class Setup:
 
     def maps_like(self, other: Setup) -> bool:
         """Whether both make the same maps: only what comes after may differ."""
-        after = {"preset", "localization", "refinement"}
-        mine, theirs = (s.config.model_dump(exclude=after) for s in (self, other))
-        return mine == theirs and self.noise == other.noise
+        unused = {"preset", "localization", "refinement"}
+        if self.poses == "oracle":
+            unused |= {"monocular_slam", "rgbd_slam"}
+        mine, theirs = (s.config.model_dump(exclude=unused) for s in (self, other))
+        return mine == theirs and (self.poses, self.noise) == (other.poses, other.noise)
 
 
 def with_localization(config: Config, **changes: object) -> Config:
@@ -51,24 +69,20 @@ def with_companions(primary: Setup, few: bool = False) -> list[Setup]:
 
     Args:
         primary: What the user asked for.
-        few: Only the paper's constants beside it, with both readings of its sigma.
+        few: Only the true poses beside it, and the paper's constants with both readings of
+            its sigma.
     """
     best, published = Config(), paper()
+    minmax = with_localization(published, sigma_units="minmax")
     companions = [
+        Setup(best, "oracle"),
         Setup(published),
-        Setup(
-            with_localization(published, sigma_units="minmax"),
-            variant="sigma 0.08 of the cost scaled to [0, 1]",
-        ),
+        Setup(minmax, variant="sigma 0.08 of the cost scaled to [0, 1]"),
     ]
     if not few:
-        companions += [
-            Setup(best),
-            Setup(best, PAPER_DRIFT),
-            Setup(with_localization(best, heading="search")),
-        ]
-    known = (primary.config, primary.noise)
-    return [primary, *(other for other in companions if (other.config, other.noise) != known)]
+        companions += [Setup(best), Setup(with_localization(best, heading="search"))]
+    known = (primary.config, primary.poses, primary.noise)
+    return [primary, *(o for o in companions if (o.config, o.poses, o.noise) != known)]
 
 
 def grouped_by_maps(setups: list[Setup]) -> list[list[Setup]]:

@@ -22,6 +22,7 @@ from evaluation.mapping_pass import Maps
 from evaluation.relation import true_T_ground_mav
 from evaluation.setups import Setup
 from evaluation.showcase import LocalizationStep, Showcase
+from evaluation.tracking_quality import Tracked
 from evaluation.trials import SEQUENCE_LENGTH, localize_sequence, sequence_starts
 from sim.truth import Truth
 
@@ -59,8 +60,8 @@ def make_showcase(
         steps=tuple(steps),
         ground_cloud=sightings[-1].ground_cloud,
         aerial_cloud=aerial_cloud,
-        mav_path=_path(maps.paths["mav"], T_ground_mav),
-        ground_path=_path(maps.paths["ground"], SE3.identity()),
+        mav_path=_path(maps.tracked["mav"], T_ground_mav),
+        ground_path=_path(maps.tracked["ground"], SE3.identity()),
         mav_image=recording.mav_image_at(surface.reference_stamp_ns).image,
         ground_image=recording.ground_image_at(shown.ground_stamp_ns).colour,
     )
@@ -123,7 +124,9 @@ def _spread(depth_maps: list[DepthMap], count: int) -> list[DepthMap]:
     return [depth_maps[i] for i in chosen]
 
 
-def _path(poses: list[tuple[int, SE3]], T_ground_map: SE3) -> Trajectory:
+def _path(tracked: Tracked, T_ground_map: SE3) -> Trajectory:
+    """Live poses, in `ground`."""
+    poses = tracked.front_end.live_poses()
     return Trajectory.from_poses(
         [stamp for stamp, _ in poses], [T_ground_map @ pose for _, pose in poses]
     )

@@ -8,14 +8,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from evo.core import metrics
+from evo.core.geometry import GeometryException
 from evo.core.trajectory import PoseTrajectory3D
+from numpy.typing import NDArray
 
 from airground.core.se3 import SE3
+
+MIN_POSES = 3
+"""Fewer poses can be brought onto any others."""
 
 
 @dataclass(frozen=True)
 class TrajectoryError:
-    """How far a trajectory is off (Fig. 9, 10).
+    """How far a trajectory is off (Fig. 9, 10); NaN where it cannot be aligned.
 
     Attributes:
         se3_rmse_m: RMS position error after SE3 alignment [m].
@@ -34,13 +39,36 @@ def trajectory_error(
     poses: list[tuple[int, SE3]], true_pose: Callable[[int], SE3]
 ) -> TrajectoryError:
     """Compare tracked poses with the truth at the same stamps [ns]."""
+    if len(poses) < MIN_POSES:
+        return TrajectoryError(np.nan, np.nan, np.nan, 0.0)
     reference = _evo([(stamp, true_pose(stamp)) for stamp, _ in poses])
     se3, sim3 = _evo(poses), _evo(poses)
-    se3.align(deepcopy(reference))
-    _, _, scale = sim3.align(deepcopy(reference), correct_scale=True)
+    try:
+        se3.align(deepcopy(reference))
+        _, _, scale = sim3.align(deepcopy(reference), correct_scale=True)
+    except GeometryException:
+        # poses on one point or line can be turned at will
+        return TrajectoryError(np.nan, np.nan, np.nan, reference.path_length)
     return TrajectoryError(
-        _rmse(reference, se3), _rmse(reference, sim3), float(scale) - 1.0, reference.path_length
+        _rmse(_errors(reference, se3)),
+        _rmse(_errors(reference, sim3)),
+        float(scale) - 1.0,
+        reference.path_length,
     )
+
+
+def aligned_errors(
+    poses: list[tuple[int, SE3]], true_pose: Callable[[int], SE3]
+) -> NDArray[np.float64]:
+    """(N,) position error of each pose after SE3 alignment of all [m]; NaN where impossible."""
+    if len(poses) < MIN_POSES:
+        return np.full(len(poses), np.nan)
+    reference, estimate = _evo([(stamp, true_pose(stamp)) for stamp, _ in poses]), _evo(poses)
+    try:
+        estimate.align(deepcopy(reference))
+    except GeometryException:
+        return np.full(len(poses), np.nan)
+    return _errors(reference, estimate)
 
 
 def _evo(poses: list[tuple[int, SE3]]) -> PoseTrajectory3D:
@@ -51,7 +79,11 @@ def _evo(poses: list[tuple[int, SE3]]) -> PoseTrajectory3D:
     )
 
 
-def _rmse(reference: PoseTrajectory3D, estimate: PoseTrajectory3D) -> float:
+def _errors(reference: PoseTrajectory3D, estimate: PoseTrajectory3D) -> NDArray[np.float64]:
     error = metrics.APE(metrics.PoseRelation.translation_part)
     error.process_data((reference, estimate))
-    return float(error.get_statistic(metrics.StatisticsType.rmse))
+    return np.asarray(error.error, np.float64)
+
+
+def _rmse(errors: NDArray[np.float64]) -> float:
+    return float(np.sqrt(np.mean(errors**2)))

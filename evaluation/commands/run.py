@@ -35,10 +35,9 @@ class Run(Verb, AloneWords, SetupWords, SeedWord, OutWord):
         from airground.io.layout import HEADER
         from airground.io.ply import write_ply
         from airground.io.recording import Recording
-        from airground.io.tum import write_tum
         from evaluation.output import fresh_folder
         from evaluation.results_folder import Results
-        from evaluation.run import run_recording
+        from evaluation.run import run_recording, write_trajectories
         from evaluation.screen import print_summary
         from sim.truth import Truth
 
@@ -53,8 +52,6 @@ class Run(Verb, AloneWords, SetupWords, SeedWord, OutWord):
             result = run_recording(recording, Truth.open(self.recording), setup, seed)
             augmented = result.augmented
             write_ply(folder / "augmented_map.ply", augmented.cloud_ground, augmented.sources)
-            for name, path in (("mav", result.mav), ("ground", result.ground)):
-                if path is not None:
-                    write_tum(folder / f"{name}_camera.tum", path)
+            write_trajectories(folder, recording, result.tracked)
             summary = Results(result.table, setup.config, seed).write(folder)
         print_summary(summary)

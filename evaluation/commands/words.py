@@ -90,26 +90,34 @@ class PipelineWords:
 class PoseWords:
     """Where the poses of both cameras come from, and what is added to them."""
 
-    poses: Literal["oracle"] = "oracle"
-    """The true poses, with the errors stated below (slam is not built yet)."""
+    poses: Literal["slam", "oracle"] = "slam"
+    """Each robot's own SLAM, or the true poses with the errors stated below."""
     drift_mav_cm: Annotated[float, arg(metavar="CM")] = 0.0
-    """RMS of the MAV's slow position error after alignment; the paper measured 1.2."""
+    """Oracle: RMS of the MAV's slow position error after alignment; the paper measured 1.2."""
     drift_ground_cm: Annotated[float, arg(metavar="CM")] = 0.0
-    """RMS of the ground robot's drift after alignment; the paper measured 3.8."""
+    """Oracle: RMS of the ground robot's drift after alignment; the paper measured 3.8."""
     pose_noise_mm: Annotated[float, arg(metavar="MM")] = 0.0
-    """White position noise per axis and frame."""
+    """Oracle: white position noise per axis and frame."""
     pose_noise_deg: Annotated[float, arg(metavar="DEG")] = 0.0
-    """White orientation noise per axis and frame."""
+    """Oracle: white orientation noise per axis and frame."""
 
     def pose_noise(self) -> PoseNoise:
-        from evaluation.oracle import PoseNoise
+        """What is added to the oracle's poses.
 
-        return PoseNoise(
+        Raises:
+            InputError: A number is out of range, or there is no oracle to add it to.
+        """
+        from evaluation.oracle import EXACT, PoseNoise
+
+        noise = PoseNoise(
             drift_mav_m=in_range("--drift-mav-cm", self.drift_mav_cm, high=100) / 100,
             drift_ground_m=in_range("--drift-ground-cm", self.drift_ground_cm, high=100) / 100,
             white_m=in_range("--pose-noise-mm", self.pose_noise_mm, high=1000) / 1000,
             white_deg=in_range("--pose-noise-deg", self.pose_noise_deg, high=45),
         )
+        if self.poses == "slam" and noise != EXACT:
+            raise InputError("drift and pose noise are added to true poses; give --poses oracle")
+        return noise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +127,7 @@ class SetupWords(PipelineWords, PoseWords):
     def setup(self) -> Setup:
         from evaluation.setups import Setup
 
-        return Setup(self.resolved_config(), self.pose_noise())
+        return Setup(self.resolved_config(), self.poses, self.pose_noise())
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,0 +1,66 @@
+"""A front end seen from outside: what it said of each image, and how long it took."""
+
+from __future__ import annotations
+
+import time
+from typing import Generic, TypeVar
+
+from airground.core.messages import GroundImage, ImuSamples, MavImage
+from airground.core.se3 import SE3
+from airground.core.trajectory import Trajectory
+from airground.slam.front_end import FrontEnd, TrackedPose, Tracking
+
+Image = TypeVar("Image", MavImage, GroundImage)
+
+
+class WatchedFrontEnd(Generic[Image]):
+    """Passes everything on, and keeps the answers and their times.
+
+    Attributes:
+        answers: One an image, in order of time.
+        durations_ms: Of each image with the inertial samples before it, mapping included,
+            decoding not.
+
+    Args:
+        inner: Who really tracks.
+    """
+
+    def __init__(self, inner: FrontEnd[Image]) -> None:
+        self.answers: list[TrackedPose] = []
+        self.durations_ms: list[float] = []
+        self._inner: FrontEnd[Image] = inner
+        self._imu_s = 0.0
+
+    def add_imu(self, samples: ImuSamples) -> None:
+        """Pass inertial measurements on."""
+        started = time.perf_counter()
+        self._inner.add_imu(samples)
+        self._imu_s += time.perf_counter() - started
+
+    def track(self, image: Image) -> TrackedPose:
+        """Pass an image on."""
+        started = time.perf_counter()
+        answer = self._inner.track(image)
+        self.durations_ms.append(1e3 * (time.perf_counter() - started + self._imu_s))
+        self._imu_s = 0.0
+        self.answers.append(answer)
+        return answer
+
+    def finish(self) -> None:
+        """Let it finish."""
+        self._inner.finish()
+
+    def trajectory(self) -> Trajectory | None:
+        """The poses that it believes in now."""
+        return self._inner.trajectory()
+
+    def live_poses(self) -> list[tuple[int, SE3]]:
+        """Stamp and pose of each tracked image, as they were said at its time."""
+        return [(a.stamp_ns, a.T_map_camera) for a in self.answers if a.T_map_camera is not None]
+
+    def since_tracking(self) -> list[TrackedPose]:
+        """The answers from the first tracked image on; none where there is no such image."""
+        for first, answer in enumerate(self.answers):
+            if answer.tracking is Tracking.TRACKED:
+                return self.answers[first:]
+        return []
