@@ -102,6 +102,81 @@ def _add_noise(
 
 
 @njit(cache=True, error_model="numpy")
+def _mean_force(
+    rotation: NDArray,
+    turned: NDArray,
+    turn: NDArray,
+    sweep: NDArray,
+    reading: NDArray,
+    following: NDArray,
+    force: NDArray,
+    lever: NDArray,
+    tilt: NDArray,
+    work: NDArray,
+) -> None:
+    """The mean force of a step in the start's frame, and how it changes.
+
+    Args:
+        rotation, turned: (3, 3) before and after the step, `turned = rotation @ turn`.
+        turn: (3, 3) of the step.
+        sweep: (3, 3) how the turn changes with the rate.
+        reading, following: (6,) before and after, without bias.
+        force: (3,) is set.
+        lever: (3, 3) is set to its change with the rotation before ...
+        tilt: (3, 3) ... and with the rate.
+        work: (3, 3) scratch.
+    """
+    _turned_force(turned, following[3:], work)
+    _product(work, turn.T, lever)
+    _product(work, sweep, tilt)
+    _turned_force(rotation, reading[3:], work)
+    for i in range(3):
+        force[i] = 0.0
+        for j in range(3):
+            lever[i, j] = -0.5 * (lever[i, j] + work[i, j])
+            tilt[i, j] *= -0.5
+            force[i] += 0.5 * (rotation[i, j] * reading[3 + j] + turned[i, j] * following[3 + j])
+
+
+@njit(cache=True, error_model="numpy")
+def _add_step(
+    velocity: NDArray,
+    position: NDArray,
+    jacobians: NDArray,
+    dt: float,
+    force: NDArray,
+    leant: NDArray,
+    turned_back: NDArray,
+    tilt: NDArray,
+    jacobian: NDArray,
+    rotation: NDArray,
+    turned: NDArray,
+) -> None:
+    """Add one step to velocity, position and their Jacobians.
+
+    Args:
+        velocity, position, jacobians: The sums.
+        dt: Length of the step [s].
+        force: (3,) mean.
+        leant, turned_back: (3, 3) lever and transposed turn, times the rotation's Jacobian.
+        tilt: (3, 3) the force by the rate.
+        jacobian: (3, 3) right Jacobian of the turn.
+        rotation, turned: (3, 3) before and after.
+    """
+    for i in range(3):
+        position[i] += dt * (velocity[i] + 0.5 * dt * force[i])
+        velocity[i] += dt * force[i]
+        for j in range(3):
+            by_gyro = leant[i, j] - tilt[i, j]
+            by_force = -0.5 * (rotation[i, j] + turned[i, j])
+            jacobians[0, i, j] = turned_back[i, j] - dt * jacobian[i, j]
+            jacobians[3, i, j] += dt * (jacobians[1, i, j] + 0.5 * dt * by_gyro)
+            jacobians[4, i, j] += dt * (jacobians[2, i, j] + 0.5 * dt * by_force)
+            jacobians[1, i, j] += dt * by_gyro
+            jacobians[2, i, j] += dt * by_force
+
+
+@njit(cache=True, error_model="numpy")
 def preintegrate(
     stamps: NDArray[np.int64],
     readings: NDArray[np.float64],
@@ -151,35 +226,26 @@ def preintegrate(
         turned = np.empty((3, 3))
         _product(rotation, turn, turned)
 
-        # How the mean force in the start's frame changes with the rotation and with the rate.
-        _turned_force(turned, following[3:], tilt)
-        _product(tilt, turn.T, lever)
-        _turned_force(rotation, reading[3:], before)
-        _product(tilt, jacobian, product)
-        for i in range(3):
-            force[i] = 0.0
-            for j in range(3):
-                lever[i, j] = -0.5 * (lever[i, j] + before[i, j])
-                tilt[i, j] = -0.5 * dt * product[i, j]
-                force[i] += 0.5 * (
-                    rotation[i, j] * reading[3 + j] + turned[i, j] * following[3 + j]
-                )
-
+        _mean_force(
+            rotation, turned, turn, dt * jacobian, reading, following, force, lever, tilt, product
+        )
         _propagate(covariance, turn, lever, dt, rows, lean)
         _add_noise(covariance, jacobian, tilt, dt, gyro_density**2, accelerometer_density**2)
         _product(lever, jacobians[0], before)
         _product(turn.T, jacobians[0], product)
-        for i in range(3):
-            position[i] += dt * (velocity[i] + 0.5 * dt * force[i])
-            velocity[i] += dt * force[i]
-            for j in range(3):
-                by_gyro = before[i, j] - tilt[i, j]
-                by_force = -0.5 * (rotation[i, j] + turned[i, j])
-                jacobians[0, i, j] = product[i, j] - dt * jacobian[i, j]
-                jacobians[3, i, j] += dt * (jacobians[1, i, j] + 0.5 * dt * by_gyro)
-                jacobians[4, i, j] += dt * (jacobians[2, i, j] + 0.5 * dt * by_force)
-                jacobians[1, i, j] += dt * by_gyro
-                jacobians[2, i, j] += dt * by_force
+        _add_step(
+            velocity,
+            position,
+            jacobians,
+            dt,
+            force,
+            before,
+            product,
+            tilt,
+            jacobian,
+            rotation,
+            turned,
+        )
         rotation, reading, stamp = turned, following, next_stamp
     return rotation, velocity, position, jacobians, covariance, _gap(stamps, start, end)
 
