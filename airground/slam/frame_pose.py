@@ -13,6 +13,11 @@ from airground.slam.geometry.translation_ransac import translation_by_known_rota
 
 RANSAC_ROUNDS = 50
 RANSAC_THRESHOLD_PX = 3.0
+BLUR = 3.0
+"""In a smeared image, or one whose rows were taken one after the other in a fast turn, corners
+are this many times less certain."""
+MIN_SHARE = 0.4
+"""A pose that fewer of the points agree on is chance."""
 PNP_ROUNDS = 100
 POSITION_SIGMA_M = 0.02
 """What inertial prediction leaves open from one image to the next [m]."""
@@ -52,28 +57,36 @@ def frame_pose(
     """
     if len(points_map) < min_points:
         return None
-    start, chosen = _consensus(
-        points_map, pixels, camera, T_map_camera_predicted, rotation_sigma, rng
-    )
-    if start is None or chosen.sum() < min_points:
-        return None
-    depths = None if inverse_depths is None else inverse_depths[chosen]
-    fit = estimate_pose(
-        points_map[chosen],
-        pixels[chosen],
-        np.full(int(chosen.sum()), sigma_px),
-        camera,
-        start,
-        inverse_depths=depths,
-        inverse_depth_sigmas=None if depths is None else np.full(len(depths), inverse_depth_sigma),
-        rotation_sigma=rotation_sigma,
-        position_sigma=POSITION_SIGMA_M if inertial else None,
-    )
-    if fit.inliers.sum() < min_points or fit.inliers.mean() < 0.5:
-        return None
-    inliers = np.zeros(len(points_map), bool)
-    inliers[np.flatnonzero(chosen)[fit.inliers]] = True
-    return PoseFit(fit.T_map_camera, inliers, fit.rms_px, fit.covariance, fit.iterations)
+    depths = np.full(len(points_map), np.nan) if inverse_depths is None else inverse_depths
+    for blur in (1.0, BLUR):
+        start, chosen = _consensus(
+            points_map,
+            pixels,
+            camera,
+            T_map_camera_predicted,
+            rotation_sigma,
+            blur * RANSAC_THRESHOLD_PX,
+            rng,
+        )
+        if start is None or chosen.sum() < min_points:
+            continue
+        count = int(chosen.sum())
+        fit = estimate_pose(
+            points_map[chosen],
+            pixels[chosen],
+            np.full(count, blur * sigma_px),
+            camera,
+            start,
+            inverse_depths=depths[chosen],
+            inverse_depth_sigmas=np.full(count, inverse_depth_sigma),
+            rotation_sigma=rotation_sigma,
+            position_sigma=POSITION_SIGMA_M if inertial else None,
+        )
+        if fit.inliers.sum() >= min_points and fit.inliers.sum() >= MIN_SHARE * len(points_map):
+            inliers = np.zeros(len(points_map), bool)
+            inliers[np.flatnonzero(chosen)[fit.inliers]] = True
+            return PoseFit(fit.T_map_camera, inliers, fit.rms_px, fit.covariance, fit.iterations)
+    return None
 
 
 def _consensus(
@@ -82,12 +95,13 @@ def _consensus(
     camera: PinholeCamera,
     predicted: SE3,
     rotation_sigma: float | None,
+    threshold_px: float,
     rng: np.random.Generator,
 ) -> tuple[SE3 | None, NDArray[np.bool_]]:
     """A pose that many points agree on, and which."""
     if rotation_sigma is not None:
         return translation_by_known_rotation(
-            points_map, pixels, camera, predicted.rotation, RANSAC_THRESHOLD_PX, RANSAC_ROUNDS, rng
+            points_map, pixels, camera, predicted.rotation, threshold_px, RANSAC_ROUNDS, rng
         )
     T_camera_map = predicted.inverse()
     found, turn, shift, rows = cv2.solvePnPRansac(
@@ -99,7 +113,7 @@ def _consensus(
         tvec=T_camera_map.translation.reshape(3, 1).copy(),
         useExtrinsicGuess=True,
         iterationsCount=PNP_ROUNDS,
-        reprojectionError=RANSAC_THRESHOLD_PX,
+        reprojectionError=threshold_px,
         flags=cv2.SOLVEPNP_ITERATIVE,
     )
     chosen = np.zeros(len(points_map), bool)

@@ -23,7 +23,10 @@ from airground.slam.sparse_map import SparseMap
 
 MAX_RESIDUAL_SIGMAS = 3.5
 """An observation farther off than this was of something else."""
-GLOBAL_ITERATIONS = 10
+GLOBAL_ITERATIONS = 15
+WINDOW_DECREASE, GLOBAL_DECREASE = 1e-5, 1e-6
+"""Adjustment ends when a step lowers the cost by less than this share. The scale of a whole map
+moves far for little cost."""
 
 
 class MapAdjuster:
@@ -74,7 +77,7 @@ class MapAdjuster:
         if inertial and first_free == 1:
             # Tilt and biases of the beginning become known only by moving.
             roles[0] = Role.GAUGE
-        settings = Settings(iterations=self._parameters.iterations)
+        settings = Settings(self._parameters.iterations, relative_decrease=WINDOW_DECREASE)
         return self._adjust(fixed + free, roles, inertial, settings)
 
     def adjust_all(self, inertial: bool) -> NDArray[np.float64] | None:
@@ -90,7 +93,7 @@ class MapAdjuster:
             roles[-1] = Role.GAUGE
         else:
             roles[0] = Role.FIXED
-        settings = Settings(iterations=GLOBAL_ITERATIONS)
+        settings = Settings(GLOBAL_ITERATIONS, relative_decrease=GLOBAL_DECREASE)
         return self._adjust(list(range(count)), roles, inertial, settings)
 
     def _holding(self, free: list[int]) -> list[int]:
