@@ -121,4 +121,4 @@ def _consensus(
         return None, chosen
     chosen[rows.ravel()] = True
     rotation = nearest_rotation(cv2.Rodrigues(turn)[0])
-    return SE3(rotation, shift.ravel()).inverse(), chosen
+    return SE3(rotation, shift.ravel().astype(np.float64)).inverse(), chosen

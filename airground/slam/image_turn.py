@@ -34,8 +34,8 @@ class ImageTurn:
     def follow(self, image: NDArray[np.uint8]) -> NDArray[np.float64] | None:
         """(2,) turn since the last image about the camera's x and y axes [rad]; None if unclear."""
         height, width = self._window.shape
-        small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
-        small = small.astype(np.float32)
+        shrunk = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+        small = shrunk.astype(np.float32)
         last, self._last = self._last, small
         if last is None:
             return None

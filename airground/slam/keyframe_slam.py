@@ -17,12 +17,14 @@ from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.slam import so3
 from airground.slam.depth_lookup import inverse_depths_at
+from airground.slam.expected_pixels import expected_pixels
 from airground.slam.feature_tracker import FeatureTracker
 from airground.slam.frame import Frame
 from airground.slam.frame_pose import frame_pose
 from airground.slam.geometry.pose_estimation import PoseFit
 from airground.slam.image_turn import ImageTurn
 from airground.slam.inertial.alignment import InertialAlignment
+from airground.slam.keyframe_choice import what_is_new
 from airground.slam.local_mapping import LocalMapper, NewKeyframe
 from airground.slam.map_adjustment import MapAdjuster
 from airground.slam.motion_model import MotionModel, Prediction
@@ -156,14 +158,16 @@ class KeyframeSlam:
             self.state, turn, self.stamp_ns, frame.stamp_ns, self.inertial
         )
         lost = self._seen_ns != self.stamp_ns
-        self.tracker.advance(frame.image, self._expected(prediction), 2 if lost else 0)
+        there = prediction.state.pose() @ self.T_rig_camera
+        expected = expected_pixels(self.map, self.tracker, self.camera, self.T_map_camera(), there)
+        self.tracker.advance(frame.image, expected, 2 if lost else 0)
         fit = self._fit(frame, prediction)
         if fit is None:
             fit = self._recover(frame, prediction)
         self._move_on(frame, prediction, fit)
         if fit is None and not (prediction.inertial and not self._tracked):
             return None, False
-        if self._wants_keyframe(frame.stamp_ns):
+        if self._wants_keyframe():
             return fit, self._insert(frame)
         return fit, False
 
@@ -196,10 +200,15 @@ class KeyframeSlam:
             accelerometer_bias=newest.state.accelerometer_bias,
         )
 
-    def make_metric(self, alignment: InertialAlignment) -> None:
-        """Scale the map and turn it upright; from now on the accelerometer counts."""
-        lever = self.T_rig_camera.translation
-        self.map.move(alignment.scale, alignment.R_map_v, lever)
+    def make_upright(self, scale: float, R_new_map: NDArray[np.float64]) -> None:
+        """Scale the map to metres and turn it so that z points up."""
+        self.map.move(scale, R_new_map, self.T_rig_camera.translation)
+        self.state = self.map.keyframes[-1].state
+        self.metric = True
+
+    def make_inertial(self, alignment: InertialAlignment) -> None:
+        """Make the map metric and upright; from now on the accelerometer counts."""
+        self.make_upright(alignment.scale, alignment.R_map_v)
         newest = self.map.keyframes[-len(alignment.velocities) :]
         for n, keyframe in enumerate(newest):
             keyframe.state = replace(
@@ -209,7 +218,7 @@ class KeyframeSlam:
                 accelerometer_bias=alignment.accelerometer_biases[n],
             )
         self.state = self.map.keyframes[-1].state
-        self.metric = self.inertial = True
+        self.inertial = True
         self.adjust_all()
 
     def covariance(self, fit: PoseFit) -> NDArray[np.float64]:
@@ -237,23 +246,6 @@ class KeyframeSlam:
         R = self.T_rig_camera.rotation
         about = so3.log(R.T @ self._turn @ R)
         return R @ so3.exp(np.array([slide[0], slide[1], about[2]])) @ R.T
-
-    def _expected(self, prediction: Prediction) -> NDArray[np.float64]:
-        """(N, 2) where the corners should be: map points by their place, others by a guess."""
-        if len(self.tracker.ids) == 0:
-            return self.tracker.pixels
-        here, there = self.T_map_camera(), prediction.state.pose() @ self.T_rig_camera
-        mapped = self.map.mapped(self.tracker.ids)
-        T_camera_map = here.inverse()
-        z = (T_camera_map @ self.map.positions[self.tracker.ids])[:, 2]
-        known = mapped & (z > 0)
-        z = np.where(known, z, np.median(z[known]) if known.any() else 1.0)
-        homogeneous = np.column_stack([self.tracker.pixels, np.ones(len(z))])
-        points = homogeneous @ np.linalg.inv(self.camera.matrix()).T * z[:, None]
-        if not known.any():  # no depth to go by: only the turn counts
-            there = SE3(there.rotation, here.translation)
-        expected = self.camera.project(there.inverse() @ (here @ points))
-        return np.where(np.isfinite(expected), expected, self.tracker.pixels)
 
     def _fit(self, frame: Frame, prediction: Prediction) -> PoseFit | None:
         """The pose by the map points that were followed into this image."""
@@ -320,38 +312,21 @@ class KeyframeSlam:
         self._turn = before.rotation.T @ state.rotation
         self.state, self.stamp_ns = state, frame.stamp_ns
 
-    def _wants_keyframe(self, stamp_ns: int) -> bool:
-        """Whether this image shows enough that the last keyframe did not."""
+    def _wants_keyframe(self) -> bool:
+        """Whether the newest image shows enough that the last keyframe did not."""
+        assert self.stamp_ns is not None
         last, parameters = self.map.keyframes[-1], self.parameters
-        order = np.argsort(last.ids)
-        place = np.searchsorted(last.ids, self.tracker.ids, sorter=order).clip(0, len(last.ids) - 1)
-        rows = order[place] if len(order) else np.empty(0, np.int64)
-        common = last.ids[rows] == self.tracker.ids if len(order) else np.zeros(0, bool)
-        if common.sum() < parameters.keyframe_share * len(last.ids):
+        timed = self.metric and self.calibration.imu is not None
+        if timed and (self.stamp_ns - last.stamp_ns) * 1e-9 >= parameters.keyframe_interval_s:
             return True
-        placed = self.map.mapped(last.ids)
-        if self.map.mapped(self.tracker.ids).sum() < parameters.keyframe_share * placed.sum():
-            return True
-        if self.motion.buffer is not None and self.metric:
-            seconds = (stamp_ns - last.stamp_ns) * 1e-9
-            if seconds >= parameters.keyframe_interval_s:
-                return True
-        moved = (
-            self._unturned(self.tracker.pixels[common], last.state.rotation)
-            - last.pixels[rows[common]]
+        view = self.state.rotation @ self.T_rig_camera.rotation
+        last_view = last.state.rotation @ self.T_rig_camera.rotation
+        news = what_is_new(self.map, last, self.tracker, last_view.T @ view, self.camera)
+        return (
+            news.share_left < parameters.keyframe_share
+            or news.mapped_left < parameters.keyframe_share
+            or news.parallax_px > parameters.keyframe_parallax_px
         )
-        parallax = np.linalg.norm(moved, axis=1)
-        return bool(len(parallax)) and float(np.median(parallax)) > parameters.keyframe_parallax_px
-
-    def _unturned(self, pixels: NDArray, rotation: NDArray) -> NDArray[np.float64]:
-        """(N, 2) pixels as the camera would see them, had it not turned since a keyframe."""
-        R_keyframe_here = self.T_rig_camera.rotation.T @ (
-            rotation.T @ self.state.rotation @ self.T_rig_camera.rotation
-        )
-        matrix = self.camera.matrix()
-        rays = np.column_stack([pixels, np.ones(len(pixels))]) @ np.linalg.inv(matrix).T
-        turned = rays @ R_keyframe_here.T @ matrix.T
-        return turned[:, :2] / turned[:, 2:]
 
     def _insert(self, frame: Frame, still: bool = False) -> bool:
         """Make the newest image a keyframe; returns whether the whole map was adjusted."""

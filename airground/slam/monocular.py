@@ -7,11 +7,12 @@ import numpy as np
 from airground.config import Config
 from airground.core.messages import ImuSamples, MavImage, RobotCalibration
 from airground.core.trajectory import Trajectory
+from airground.slam.filtered_scale import FilteredScale
 from airground.slam.frame import Frame
 from airground.slam.front_end import TrackedPose, Tracking
 from airground.slam.keyframe_slam import KeyframeSlam
-from airground.slam.metric_scale import MetricScale
 from airground.slam.starts import RestStart, TwoViewWait
+from airground.slam.tight_scale import TightScale
 
 MIN_TRACKED = 30
 """Map points that must be seen before the first pose is given out."""
@@ -37,7 +38,8 @@ class MonocularSlam:
     ) -> None:
         slam_rng, start_rng = rng.spawn(2)
         self._slam = KeyframeSlam(calibration, config.monocular_slam, slam_rng)
-        self._scale = MetricScale(self._slam)
+        self._tight = config.monocular_slam.scale == "tight"
+        self._scale = TightScale(self._slam) if self._tight else FilteredScale(self._slam)
         self._rest = RestStart(calibration)
         self._two_views = TwoViewWait(calibration, config.monocular_slam, start_rng)
         self._given_out = False
@@ -54,7 +56,7 @@ class MonocularSlam:
             self._begin(frame)
             return self._initializing(frame)
         fit, corrected = slam.track(frame)
-        corrected |= self._scale.update()
+        corrected |= self._scale.update(fit is not None)
         if not self._given_out:
             if slam.unseen_s() > MAX_UNSEEN_S:
                 slam.reset()
@@ -85,7 +87,7 @@ class MonocularSlam:
 
     def _begin(self, frame: Frame) -> None:
         """Begin the map if the robot just left its place, or two views allow it."""
-        begin = self._rest.observe(frame, self._slam.motion)
+        begin = self._rest.observe(frame, self._slam.motion) if self._tight else None
         if begin is not None:
             self._slam.metric = self._slam.inertial = True
             self._slam.begin(*begin, still=True)

@@ -35,7 +35,7 @@ def flow(
     """
     if len(pixels) == 0 or min(cv2.mean(image)[0], cv2.mean(other)[0]) < MIN_BRIGHTNESS:
         return start.copy(), np.zeros(len(pixels), bool)
-    found_px, status, difference = cv2.calcOpticalFlowPyrLK(
+    moved, status, difference = cv2.calcOpticalFlowPyrLK(
         image,
         exposed_alike(other, image),
         np.ascontiguousarray(pixels, np.float32).reshape(-1, 1, 2),
@@ -46,7 +46,7 @@ def flow(
         flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
         minEigThreshold=1e-3,
     )
-    found_px = found_px.reshape(-1, 2)
+    found_px = moved.reshape(-1, 2).astype(np.float32)
     height, width = image.shape
     inside = (found_px >= BORDER_PX).all(axis=1)
     inside &= (found_px[:, 0] < width - BORDER_PX) & (found_px[:, 1] < height - BORDER_PX)
@@ -76,4 +76,4 @@ def exposed_alike(image: NDArray[np.uint8], like: NDArray[np.uint8]) -> NDArray[
     gain = cv2.mean(like)[0] / max(cv2.mean(image)[0], 1.0)
     if abs(gain - 1.0) < 0.02:
         return image
-    return cv2.convertScaleAbs(image, alpha=gain)
+    return cv2.convertScaleAbs(image, alpha=gain).astype(np.uint8, copy=False)

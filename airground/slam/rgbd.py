@@ -44,7 +44,7 @@ class RgbdSlam:
 
     def track(self, image: GroundImage) -> TrackedPose:
         """Where the camera was when `image` was taken."""
-        grey = cv2.cvtColor(image.colour, cv2.COLOR_RGB2GRAY)
+        grey = cv2.cvtColor(image.colour, cv2.COLOR_RGB2GRAY).astype(np.uint8, copy=False)
         frame = Frame(image.stamp_ns, grey, image.depth)
         slam = self._slam
         if not slam.begun:

@@ -1,4 +1,4 @@
-"""Metric scale and the vertical of a monocular map, by its IMU (Sec. IV)."""
+"""Metric scale and the vertical of a monocular map, tightly coupled with its IMU (Sec. IV)."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ POSE_SIGMA_PX = 0.3
 """Noise of a keyframe's place, as its points would see it [px]."""
 
 
-class MetricScale:
-    """Tightly coupled: inertial factors in bundle adjustment hold the scale.
+class TightScale:
+    """Inertial factors in bundle adjustment hold the scale.
 
     A map that began at rest is metric from the start, and only has to tell how well it knows
     its scale. One that began in motion is scaled and turned upright once both are known.
@@ -43,8 +43,12 @@ class MetricScale:
         self._slam = slam
         self._judged = 0
 
-    def update(self) -> bool:
-        """Look at new keyframes; returns whether the map was moved."""
+    def update(self, tracked: bool) -> bool:
+        """Look at new keyframes; returns whether the map was moved.
+
+        Args:
+            tracked: Whether the newest image gave a pose; here only keyframes matter.
+        """
         slam = self._slam
         count = len(slam.map.keyframes)
         if slam.motion.buffer is None:
@@ -64,7 +68,7 @@ class MetricScale:
         self.known = self.known or ready
         if slam.inertial or not ready:
             return False
-        slam.make_metric(alignment)
+        slam.make_inertial(alignment)
         return True
 
     def _alignment(self) -> InertialAlignment | None:
@@ -78,7 +82,7 @@ class MetricScale:
         centres = np.array(
             [state.position + state.rotation @ slam.T_rig_camera.translation for state in states]
         )
-        noise = VisualNoise(self._pose_sigma())
+        noise = VisualNoise(pose_sigma(slam))
         if slam.inertial:
             return refine_scale(rotations, centres, slam.T_rig_camera, motions, noise)
         known: list[Preintegration] = [motion for motion in motions if motion is not None]
@@ -86,7 +90,8 @@ class MetricScale:
             return None
         return align(rotations, centres, slam.T_rig_camera, known, noise)
 
-    def _pose_sigma(self) -> float:
-        """Noise of a keyframe's place, in the map's unit."""
-        depths = self._slam.depth_range()
-        return POSE_SIGMA_PX / self._slam.camera.fx * (depths[1] if depths else 1.0)
+
+def pose_sigma(slam: KeyframeSlam) -> float:
+    """Noise of a camera's place, in the map's unit."""
+    depths = slam.depth_range()
+    return POSE_SIGMA_PX / slam.camera.fx * (depths[1] if depths else 1.0)

@@ -1,0 +1,65 @@
+"""Metric scale and the vertical of a monocular map by a Kalman filter, as published (Sec. IV)."""
+
+from __future__ import annotations
+
+from airground.slam.front_end import ScaleEstimate
+from airground.slam.inertial.alignment import VisualNoise
+from airground.slam.inertial.scale_filter import ScaleFilter
+from airground.slam.inertial.stationarity import gravity_aligned
+from airground.slam.keyframe_slam import KeyframeSlam
+from airground.slam.tight_scale import pose_sigma
+
+SETTLING_S = 5.0
+"""The filter is not asked before it has seen this much motion [s]."""
+GIVE_OUT_SIGMA = 0.03
+"""Poses are given out when the scale is known this well [share]; more takes half a minute."""
+
+
+class FilteredScale:
+    """Loosely coupled: vision alone makes the map, the filter tells its unit and vertical.
+
+    The map is scaled once, when the scale is known; later corrections would tear apart what
+    was built on it.
+
+    Args:
+        slam: Whose map; changed in place.
+
+    Attributes:
+        estimate: How well the scale is known; None before there was anything to judge by.
+        known: Whether poses may be given out.
+    """
+
+    def __init__(self, slam: KeyframeSlam) -> None:
+        self.estimate: ScaleEstimate | None = None
+        self.known = slam.calibration.imu is None
+        self._slam = slam
+        self._filter: ScaleFilter | None = None
+        self._first_ns = self._last_ns = 0
+
+    def update(self, tracked: bool) -> bool:
+        """Take in the newest pose; returns whether the map was moved.
+
+        Args:
+            tracked: Whether the newest image gave a pose.
+        """
+        slam = self._slam
+        if self.known or not tracked or slam.stamp_ns is None:
+            return False
+        stamp_ns, pose = slam.stamp_ns, slam.T_map_camera()
+        if self._filter is None:
+            self._filter = ScaleFilter(slam.T_rig_camera, VisualNoise(pose_sigma(slam)))
+            self._first_ns, motion = stamp_ns, None
+        else:
+            motion = slam.motion.preintegrate(self._last_ns, stamp_ns, slam.state)
+        self._last_ns = stamp_ns
+        self._filter.add(slam.state.rotation, pose.translation, motion)
+        sigma = self._filter.sigma
+        self.estimate = ScaleEstimate(sigma, self._filter.observable)
+        settled = (stamp_ns - self._first_ns) * 1e-9 >= SETTLING_S
+        gravity = self._filter.gravity
+        if not settled or sigma > GIVE_OUT_SIGMA or gravity is None:
+            return False
+        right = slam.map.keyframes[0].state.rotation @ slam.T_rig_camera.rotation[:, 0]
+        slam.make_upright(self._filter.scale, gravity_aligned(-gravity, right))
+        self.known = True
+        return True

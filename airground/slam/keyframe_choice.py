@@ -1,0 +1,64 @@
+"""How much an image shows that the last keyframe did not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.camera import PinholeCamera
+from airground.slam.feature_tracker import FeatureTracker
+from airground.slam.sparse_map import Keyframe, SparseMap
+
+
+@dataclass(frozen=True)
+class News:
+    """What changed since the last keyframe.
+
+    Attributes:
+        share_left: Share of its corners that are still followed.
+        mapped_left: Map points followed now, as a share of those it saw.
+        parallax_px: Median way of the corners, turning taken out [px]; 0 without any.
+    """
+
+    share_left: float
+    mapped_left: float
+    parallax_px: float
+
+
+def what_is_new(
+    sparse_map: SparseMap,
+    last: Keyframe,
+    tracker: FeatureTracker,
+    R_last_here: NDArray[np.float64],
+    camera: PinholeCamera,
+) -> News:
+    """Compare the newest image with the last keyframe.
+
+    Args:
+        sparse_map: Of both.
+        last: The last keyframe.
+        tracker: Stands at the newest image.
+        R_last_here: (3, 3) turn of the camera since the keyframe.
+        camera: Of both images.
+    """
+    _, here, there = np.intersect1d(tracker.ids, last.ids, return_indices=True)
+    moved = _turned(tracker.pixels[here], R_last_here, camera) - last.pixels[there]
+    parallax = np.linalg.norm(moved, axis=1)
+    mapped_then = max(int(sparse_map.mapped(last.ids).sum()), 1)
+    return News(
+        len(here) / max(len(last.ids), 1),
+        int(sparse_map.mapped(tracker.ids).sum()) / mapped_then,
+        float(np.median(parallax)) if len(parallax) else 0.0,
+    )
+
+
+def _turned(
+    pixels: NDArray[np.float32], R: NDArray[np.float64], camera: PinholeCamera
+) -> NDArray[np.float64]:
+    """(N, 2) where pixels would be, had the camera not turned by R."""
+    matrix = camera.matrix()
+    rays = np.column_stack([pixels, np.ones(len(pixels))]) @ np.linalg.inv(matrix).T
+    turned = rays @ R.T @ matrix.T
+    return turned[:, :2] / turned[:, 2:]
