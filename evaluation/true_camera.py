@@ -12,6 +12,7 @@ from airground.core.cloud import Source
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.errors import RecordingError
+from airground.io.euroc import read_lines
 from airground.io.plain_euroc import euroc_folder
 from airground.io.robot_recording import RobotRecording
 from airground.io.tum import read_tum
@@ -62,12 +63,12 @@ def read_euroc_poses(path: Path) -> Trajectory:
     Raises:
         RecordingError: Names the file and what is wrong.
     """
+    lines = [line.split(",") for line in read_lines(path) if line and not line.startswith("#")]
     try:
-        columns = range(EUROC_COLUMNS)
-        table = np.loadtxt(path, delimiter=",", comments="#", usecols=columns, dtype=str, ndmin=2)
-        stamps = table[:, 0].astype(np.int64)
-        values = table[:, 1:].astype(np.float64)
-    except (OSError, ValueError, IndexError) as error:
+        stamps = np.array([int(fields[0]) for fields in lines], np.int64)
+        values = np.array([fields[1:EUROC_COLUMNS] for fields in lines], np.float64)
+        values = values.reshape(-1, EUROC_COLUMNS - 1)
+    except ValueError as error:
         raise RecordingError(f"{path}: expected stamp, x, y, z, qw, qx, qy, qz: {error}") from None
     quaternions = values[:, 3:]
     off = np.abs(np.linalg.norm(quaternions, axis=1) - 1) > UNIT_TOLERANCE
