@@ -17,6 +17,7 @@ from evaluation.headline import headlines
 from evaluation.report_failures import control_table, failure_table
 from evaluation.report_figures import report_figures
 from evaluation.report_tables import comparison_table, scene_table, timing_table
+from evaluation.report_trajectories import trajectory_table
 from evaluation.results import Condition, ResultTable, shared_parts
 from evaluation.run_info import RunInfo
 from evaluation.showcase import Showcase
@@ -74,6 +75,7 @@ def write_report(
         comparison=comparison_table(table, shown),
         shared=shared_parts(shown) if len(shown) > 1 else shown[0].label(),
         pictures=pictures,
+        trajectories=trajectory_table(table, shown),
         timing=timing_table(measured),
         by_scene=scene_table(primary),
         controls=control_table(table, shown),

@@ -95,9 +95,18 @@ def timing_table(table: ResultTable) -> TextTable:
         if stage.published_ms is not None:
             paper = f"{stage.published_ms:g} ({stage.processor})"
         spread = quantiles(values)
-        cells = (_ms(spread.median), _ms(spread.p95)) if len(values) else ("not run", MISSING)
+        cells = ("not run", MISSING, MISSING)
+        if len(values):
+            cells = (_ms(float(values.mean())), _ms(spread.median), _ms(spread.p95))
         rows.append((f"{stage.group}: {stage.title}", paper, *cells, str(len(values))))
-    header = ("stage", "paper, average [ms]", "here, median [ms]", "here, 95 % [ms]", "n")
+    header = (
+        "stage",
+        "paper, average [ms]",
+        "here, average [ms]",
+        "here, median [ms]",
+        "here, 95 % [ms]",
+        "n",
+    )
     return TextTable(header, tuple(rows))
 
 
@@ -211,8 +220,16 @@ _COMPARED_ROWS: tuple[tuple[str, str, Callable[[ResultTable], str]], ...] = (
     ("refined, median", "76 mm, 3.0°", _trial_errors("after")),
     ("the same started at the truth (bound)", MISSING, _trial_errors("from_truth")),
     ("refined within 5 cm and 2°", MISSING, lambda t: rate(wilson(*within_5cm_2deg(t)))),
-    ("MAV poses, RMS error", "12 mm", _median_of("trajectory", "mav_ate_se3_rmse_m", metres)),
-    ("ground poses, RMS error", "38 mm", _median_of("trajectory", "ground_ate_se3_rmse_m", metres)),
+    (
+        "MAV poses, live, RMS after SE3",
+        "12 mm",
+        _median_of("trajectory", "mav_ate_se3_rmse_m", metres),
+    ),
+    (
+        "ground poses, live, RMS after SE3",
+        "38 mm",
+        _median_of("trajectory", "ground_ate_se3_rmse_m", metres),
+    ),
     ("fused surface, median error", MISSING, _surface),
     ("fused surface, pixels with depth", MISSING, _median_of("surface", "completeness", _percent)),
     ("recorded over processing seconds", "real time\nwith a GPU", _real_time),

@@ -20,7 +20,7 @@ from airground.errors import InputError
 from evaluation.published import TABLE_I
 from evaluation.results import Condition, ResultTable
 from evaluation.run_info import RunInfo
-from evaluation.statistics import quantiles, rate_within, wilson, with_failures
+from evaluation.statistics import quantile, quantiles, rate_within, wilson, with_failures
 
 SCHEMA: Literal[1] = 1
 
@@ -38,23 +38,35 @@ class Machine(_Part):
     cores: Count
 
 
-class SlamMav(_Part):
+class SlamRobot(_Part):
+    """Medians over the runs; `ate` is of live poses, `final_ate` of those believed at the end.
+
+    Scale errors are absolute. `worst` is the largest over the runs, null where one run has no
+    trajectory; `nees` is divided by its degrees of freedom, so that 1 is right.
+    """
+
     ate_sim3_rmse_m: Number = None
     ate_se3_rmse_m: Number = None
     scale_error: Number = None
+    final_ate_sim3_rmse_m: Number = None
+    final_ate_se3_rmse_m: Number = None
+    final_scale_error: Number = None
+    worst_ate_se3_rmse_m: Number = None
+    worst_final_ate_se3_rmse_m: Number = None
     tracked_fraction: Number = None
+    least_tracked_fraction: Number = None
+    initialized_s: Number = None
     path_m: Number = None
-
-
-class SlamGround(_Part):
-    ate_se3_rmse_m: Number = None
-    tracked_fraction: Number = None
-    path_m: Number = None
+    scale_sigma: Number = None
+    nees_position: Number = None
+    within_95_position: Number = None
+    nees_pose: Number = None
+    within_95_pose: Number = None
 
 
 class Slam(_Part):
-    mav: SlamMav
-    ground: SlamGround
+    mav: SlamRobot
+    ground: SlamRobot
 
 
 class Surface(_Part):
@@ -112,6 +124,7 @@ class Refinement(_Part):
 
 
 class Timing(_Part):
+    mean: Number
     median: Number
     p95: Number
     n: Count
@@ -214,15 +227,24 @@ def real_time_factor(table: ResultTable) -> float | None:
 
 def _slam(table: ResultTable, condition: Condition) -> Slam:
     if condition.poses != "slam":
-        return Slam(mav=SlamMav(), ground=SlamGround())
+        return Slam(mav=SlamRobot(), ground=SlamRobot())
+    return Slam(mav=_slam_robot(table, "mav"), ground=_slam_robot(table, "ground"))
 
-    def medians(robot: str, part: type[BaseModel]) -> dict[str, float | None]:
-        names = part.model_fields
-        return {m: _median(table.values("trajectory", f"{robot}_{m}")) for m in names}
 
-    return Slam(
-        mav=SlamMav(**medians("mav", SlamMav)), ground=SlamGround(**medians("ground", SlamGround))
-    )
+def _slam_robot(table: ResultTable, robot: str) -> SlamRobot:
+    made: dict[str, float | None] = {}
+    for name in SlamRobot.model_fields:
+        metric = name.removeprefix("worst_").removeprefix("least_")
+        values = table.values("trajectory", f"{robot}_{metric}")
+        if name.endswith("scale_error"):
+            values = np.abs(values)
+        if name.startswith("worst_"):
+            made[name] = _number(quantile(values, 1.0))
+        elif name.startswith("least_"):
+            made[name] = _number(quantile(values, 0.0))
+        else:
+            made[name] = _median(values)
+    return SlamRobot(**made)
 
 
 def _surface(table: ResultTable) -> Surface:
@@ -269,7 +291,10 @@ def _timing(table: ResultTable) -> TimingTable:
             values = table.values("timing", stage.metric)
             spread = quantiles(values)
             entries[stage.metric] = Timing(
-                median=_number(spread.median), p95=_number(spread.p95), n=len(values)
+                mean=float(values.mean()) if len(values) else None,
+                median=_number(spread.median),
+                p95=_number(spread.p95),
+                n=len(values),
             )
     return TimingTable(**entries)
 

@@ -90,7 +90,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
         (["simulate", "flat", "--out", "x", "--sed", "1"], "--sed"),
         (["simulate", "flat"], "--out"),
         (["doctor", "--threads", "0"], "--threads 0: must be at least 1"),
-        (["reproduce", "--out", "x", "--poses", "slam"], "'oracle'"),
+        (["reproduce", "--out", "x", "--poses", "file"], "'slam'"),
     ],
 )
 def test_wrong_words_get_one_line(

@@ -52,7 +52,7 @@ def test_values_are_toml_and_words_need_no_quotes() -> None:
     ("override", "named"),
     [
         ("localization.sgima=1", "unknown key localization.sgima; known: cost, sigma"),
-        ("localisation.sigma=1", "unknown section 'localisation'; known: view_selection"),
+        ("localisation.sigma=1", "unknown section 'localisation'; known: monocular_slam"),
         ("preset=paper", "expected SECTION.NAME=VALUE"),
         ("localization.sigma", "expected SECTION.NAME=VALUE"),
         ("localization.min_overlap=2", "localization.min_overlap = 2"),

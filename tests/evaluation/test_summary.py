@@ -30,10 +30,10 @@ def test_every_key_of_the_contract_is_there(table: ResultTable, tmp_path: Path) 
         "slam", "surface", "localization", "refinement", "timing_ms", "real_time_factor",
     ]  # fmt: skip
     assert made["machine"] == {"cpu": "some processor", "cores": 2}
-    assert set(made["slam"]["mav"]) == {
-        "ate_sim3_rmse_m", "ate_se3_rmse_m", "scale_error", "tracked_fraction", "path_m"
-    }  # fmt: skip
-    assert set(made["slam"]["ground"]) == {"ate_se3_rmse_m", "tracked_fraction", "path_m"}
+    promised = {"ate_sim3_rmse_m", "ate_se3_rmse_m", "scale_error", "tracked_fraction", "path_m"}
+    assert promised < set(made["slam"]["mav"])
+    assert {"final_ate_se3_rmse_m", "worst_ate_se3_rmse_m", "nees_pose"} < set(made["slam"]["mav"])
+    assert set(made["slam"]["ground"]) == set(made["slam"]["mav"])
     assert set(made["surface"]) == {"error_median_m", "error_p90_m", "completeness"}
     quantiles = {"median", "q25", "q75", "p95"}
     assert set(made["localization"]["error_m"]) == quantiles
@@ -43,7 +43,7 @@ def test_every_key_of_the_contract_is_there(table: ResultTable, tmp_path: Path) 
         "mono_slam", "rgbd_slam", "add_frame", "distance_field", "fusion", "ray_cast",
         "cost_map", "particles", "icp",
     }  # fmt: skip
-    assert set(made["timing_ms"]["icp"]) == {"median", "p95", "n"}
+    assert set(made["timing_ms"]["icp"]) == {"mean", "median", "p95", "n"}
 
 
 def test_numbers_agree_with_a_plain_calculation(table: ResultTable) -> None:
@@ -76,13 +76,26 @@ def test_oracle_poses_leave_slam_null(table: ResultTable) -> None:
 
 def test_slam_poses_fill_slam() -> None:
     condition = Condition("best", "slam", "nominal", "known")
+    errors = [0.01, 0.002, 0.05]
     rows = [
-        Row("indoor_a", 1, 0, condition, "trajectory", "mav_ate_se3_rmse_m", 0.01, "m"),
-        Row("indoor_a", 1, 0, condition, "trajectory", "ground_path_m", 7.7, "m"),
+        Row("indoor_a", seed, 0, condition, "trajectory", metric, value, "m")
+        for seed, error in enumerate(errors)
+        for metric, value in (
+            ("mav_ate_se3_rmse_m", error),
+            ("mav_final_ate_se3_rmse_m", np.nan if seed == 1 else error / 2),
+            ("mav_scale_error", -error if seed else error),
+            ("mav_tracked_fraction", 1 - error),
+            ("ground_path_m", 7.7),
+        )
     ]
     made = build_summary(ResultTable.from_rows(rows), condition, RUN)
-    assert (made.poses, made.slam.mav.ate_se3_rmse_m) == ("slam", 0.01)
-    assert (made.slam.ground.path_m, made.slam.mav.scale_error) == (7.7, None)
+    mav, ground = made.slam.mav, made.slam.ground
+    assert made.poses == "slam"
+    assert (mav.ate_se3_rmse_m, mav.worst_ate_se3_rmse_m) == (0.01, 0.05)
+    assert (mav.final_ate_se3_rmse_m, mav.worst_final_ate_se3_rmse_m) == (0.025, None)
+    assert mav.scale_error == 0.01
+    assert mav.least_tracked_fraction == pytest.approx(0.95)
+    assert (ground.path_m, ground.scale_error) == (7.7, None)
 
 
 def test_failures_count_and_become_null_not_infinity(tmp_path: Path) -> None:
@@ -109,8 +122,8 @@ def test_a_refused_alignment_is_no_success() -> None:
 
 
 def test_a_condition_that_was_not_measured_is_named() -> None:
-    other = Condition("best", "slam", "harsh", "known")
-    with pytest.raises(InputError, match="nothing was measured with preset best, poses from slam"):
+    other = Condition("best", "slam", "harsh", "known")  # the table has oracle poses only
+    with pytest.raises(InputError, match="nothing was measured with preset best, poses from SLAM"):
         build_summary(make_table(sequences=1, conditions=(BEST,)), other, RUN)
 
 
