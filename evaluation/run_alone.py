@@ -22,9 +22,6 @@ from airground.io.tum import write_tum
 from airground.slam.front_end import FrontEnd, TrackedPose, Tracking
 from evaluation.trajectory_error import trajectory_error
 
-MIN_POSES = 3
-"""A trajectory cannot be aligned with fewer."""
-
 
 @dataclass(frozen=True, eq=False)
 class AloneResult:
@@ -179,9 +176,9 @@ def _error(
         for index, stamp in enumerate(cameras.stamps_ns)
         if int(stamp) in known
     ]
-    if len(poses) < MIN_POSES:
-        return None
     error = trajectory_error(poses, lambda stamp: known[stamp])
+    if not np.isfinite(error.se3_rmse_m):
+        return None  # too few poses, or all in one place
     return {
         "poses": len(poses),
         "path_m": error.path_m,
