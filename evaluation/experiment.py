@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from airground.io.recording import Recording
+from evaluation.error_budget import add_error_budget
 from evaluation.mapping_pass import Maps, map_recording
 from evaluation.results import Row
 from evaluation.row_writer import RowWriter
@@ -50,6 +51,7 @@ class Task:
         setups: What to measure; all make the same maps.
         protocol: How much of it.
         showcase: Whether to gather what pictures need, of the first setup.
+        budget: Whether to measure what each stage loses, with the first setup.
     """
 
     recording: Path
@@ -58,6 +60,7 @@ class Task:
     setups: list[Setup]
     protocol: Protocol
     showcase: bool = False
+    budget: bool = False
 
 
 @dataclass(frozen=True)
@@ -81,6 +84,8 @@ def run_task(task: Task) -> Outcome:
         _add_surfaces(out, maps, truth)
         _add_sequences(out, maps, truth, setup, task)
         _add_trials(out, maps, truth, setup, task)
+        if task.budget and setup is task.setups[0]:
+            add_error_budget(out, recording, truth, setup, maps, (task.seed, task.flight))
         rows += out.rows
     showcase = None
     if task.showcase:

@@ -32,6 +32,7 @@ class Plan:
         sensors: How good the sensors are.
         protocol: How much is measured on each recording.
         seed: Draws the heaps, the flights, the noise and the particles.
+        budget: Whether to measure what each stage of the primary setup loses.
     """
 
     scenes: list[Scene]
@@ -40,6 +41,7 @@ class Plan:
     sensors: SensorPreset
     protocol: Protocol
     seed: int
+    budget: bool = False
 
 
 @dataclass(frozen=True)
@@ -63,8 +65,17 @@ def reproduce(plan: Plan, recordings: Path, workers: int | None = None) -> Findi
         for flight in range(plan.flights):
             path = _recorded(plan, scene, flight, recordings, workers)
             for setups in grouped_by_maps(plan.setups):
-                first = not tasks
-                tasks.append(Task(path, plan.seed, flight, setups, plan.protocol, first))
+                tasks.append(
+                    Task(
+                        path,
+                        plan.seed,
+                        flight,
+                        setups,
+                        plan.protocol,
+                        showcase=not tasks,
+                        budget=plan.budget and setups[0] is plan.setups[0],
+                    )
+                )
     return _measured(tasks, workers or usable_cores())
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
+from airground.errors import InputError
 from evaluation.commands.words import OutWord, SeedWord, SensorWord, SetupWords, Verb, in_range
 
 if TYPE_CHECKING:
@@ -33,6 +34,9 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, OutWord):
     """One small scene and a short flight: minutes instead of hours."""
     alone: bool = False
     """Measure only the setup asked for, nothing beside it."""
+    budget: bool = False
+    """Also measure what each stage loses, by putting the truth in its place: three more
+    passes over each recording."""
     scenes: Annotated[
         tuple[str, ...],
         arg(metavar="SCENE ...", help_behavior_hint=f"(default: {' '.join(SCENES)})"),
@@ -77,6 +81,8 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, OutWord):
         from sim.scene import load_scene
 
         setup = self.setup()
+        if self.budget and setup.poses != "slam":
+            raise InputError("--budget asks what SLAM loses among others; give --poses slam")
         scenes = self.scenes or (QUICK_SCENES if self.quick else SCENES)
         return Plan(
             scenes=[load_scene(scene) for scene in scenes],
@@ -88,6 +94,7 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, OutWord):
                 trials=self._count("trials", QUICK_TRIALS, TRIALS),
             ),
             seed=self.checked_seed(),
+            budget=self.budget,
         )
 
     def _count(self, name: str, quick: int, full: int) -> int:
