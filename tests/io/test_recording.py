@@ -11,6 +11,7 @@ from airground.core.cloud import Source
 from airground.core.messages import GroundImage, ImuSamples, MagneticSamples, MavImage
 from airground.errors import RecordingError
 from airground.io import layout
+from airground.io.euroc import read_imu, write_imu
 from airground.io.recording import Recording
 from tests.io.recordings import (
     GROUND_STAMPS,
@@ -98,6 +99,20 @@ def edit(file: Path, old: str, new: str) -> None:
     file.write_text(text.replace(old, new, 1))
 
 
+def flip_gravity(file: Path) -> None:
+    samples = read_imu(file)
+    write_imu(file, ImuSamples(samples.stamps_ns, samples.gyro, -samples.accelerometer))
+
+
+def in_microseconds(file: Path) -> None:
+    samples = read_imu(file)
+    write_imu(file, ImuSamples(samples.stamps_ns // 1000, samples.gyro, samples.accelerometer))
+
+
+def keep_lines(file: Path, count: int) -> None:
+    file.write_text("\n".join(file.read_text().splitlines()[:count]) + "\n")
+
+
 IMAGE = f"{layout.MAV_IMAGES}/83333333.png"
 SECOND_ROW = "5000000,"
 BROKEN = {
@@ -140,6 +155,18 @@ BROKEN = {
     "short row": (
         lambda p: (p / layout.GROUND_IMU_DATA).write_text("#\n0,1,1,1,1,1,1\n5,1,1\n"),
         "6 numbers a line",
+    ),
+    "gravity of the wrong sign": (
+        lambda p: flip_gravity(p / layout.MAV_IMU_DATA),
+        r"mav0/imu0/data\.csv: gravity has the wrong sign",
+    ),
+    "IMU that ends early": (
+        lambda p: keep_lines(p / layout.GROUND_IMU_DATA, 20),
+        r"ground/imu0/data\.csv: the IMU does not cover the images: it ends 0\.065 s before",
+    ),
+    "IMU stamps in microseconds": (
+        lambda p: in_microseconds(p / layout.MAV_IMU_DATA),
+        r"mav0/imu0/data\.csv: .* they look like microseconds; expected nanoseconds",
     ),
     "unequal count": (
         lambda p: edit(p / "recording.toml", "mav = 4", "mav = 5"),
