@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,10 @@ class RigState:
 
     def pose(self) -> SE3:
         """`T_map_rig`."""
+        return self._pose
+
+    @cached_property
+    def _pose(self) -> SE3:
         return SE3(nearest_rotation(self.rotation), self.position)
 
     def posed(self, T_map_rig: SE3) -> RigState:
