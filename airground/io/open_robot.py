@@ -42,12 +42,7 @@ def open_robot(path: Path, robot: Source, calibration_file: Path | None = None) 
             )
         return open_euroc(path, calibration_file)
     if is_tum_folder(path):
-        if robot != Source.GROUND:
-            raise RecordingError(
-                f"{path}: a TUM RGB-D folder has no gyro, without which one camera has no "
-                "metric scale; it can only be read as the ground robot's"
-            )
-        return open_tum(path, calibration_file)
+        return open_tum(path, robot, calibration_file)
     raise RecordingError(
         f"{path}: holds neither {layout.HEADER} (a recording of ours) nor mav0/cam0 (EuRoC) "
         "nor rgb.txt (TUM RGB-D)"

@@ -14,11 +14,12 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.cloud import Source
-from airground.core.messages import GroundImage, RobotCalibration
+from airground.core.messages import GroundImage, MavImage, RobotCalibration
 from airground.core.se3 import SE3
 from airground.errors import RecordingError
 from airground.io.associate import associate
@@ -57,7 +58,7 @@ def is_tum_folder(path: Path) -> bool:
     return (path / "rgb.txt").is_file()
 
 
-def open_tum(path: Path, calibration_file: Path | None = None) -> RobotRecording:
+def open_tum(path: Path, robot: Source, calibration_file: Path | None = None) -> RobotRecording:
     """Open a folder of colour and depth images and check all but the images.
 
     Colour and depth are paired by their stamps, one to one, nearest first, at most 20 ms
@@ -65,6 +66,8 @@ def open_tum(path: Path, calibration_file: Path | None = None) -> RobotRecording
 
     Args:
         path: The folder with `rgb.txt`.
+        robot: Whom to take it for. The MAV's images are grey and without depth, and with no
+            gyro either the scale of its map is unknown.
         calibration_file: Of the colour camera, in the form of EuRoC's `sensor.yaml`.
 
     Raises:
@@ -88,6 +91,11 @@ def open_tum(path: Path, calibration_file: Path | None = None) -> RobotRecording
     if missing is not None:
         raise RecordingError(f"{missing}: this image is listed but missing")
 
+    def read_grey_image(index: int) -> MavImage:
+        colour = read_colour(files[index][0], lens.width, lens.height)
+        grey = np.asarray(cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY), np.uint8)
+        return MavImage(int(stamps[index]), undistortion.image(grey))
+
     def read_image(index: int) -> GroundImage:
         colour_file, depth_file = files[index]
         colour = read_colour(colour_file, lens.width, lens.height)
@@ -102,12 +110,12 @@ def open_tum(path: Path, calibration_file: Path | None = None) -> RobotRecording
     return RobotRecording(
         path=path,
         layout="tum",
-        robot=Source.GROUND,
+        robot=robot,
         calibration=RobotCalibration(undistortion.camera, SE3.identity(), level),
         camera_stamps=stamps,
         imu=None,
         magnetic=None,
-        read_image=read_image,
+        read_image=read_grey_image if robot == Source.MAV else read_image,
         pose_frame="camera",
         T_pose_camera=SE3.identity(),
     )

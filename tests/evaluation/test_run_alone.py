@@ -88,7 +88,7 @@ def test_without_truth_there_is_a_trajectory_but_no_error(tum: Path, tmp_path: P
 
 BAD_WORDS = {
     "both robots": ((), "one alone from EuRoC or TUM RGB-D with --only"),
-    "wrong robot": (("--only", "mav"), "it can only be read as the ground robot's"),
+    "wrong front end": (("--only", "mav", "--front-end", "opencv"), "known: slam, file"),
     "front end": (("--only", "ground", "--front-end", "orb"), "known: slam, open3d, opencv, file"),
     "no file": (("--only", "ground", "--front-end", "file"), "--trajectory FILE go together"),
     "front end of both": (("--front-end", "opencv"), "only with --only"),

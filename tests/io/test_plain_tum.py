@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airground.core.cloud import Source
-from airground.core.messages import GroundImage
+from airground.core.messages import GroundImage, MavImage
 from airground.errors import RecordingError
 from airground.io.associate import associate
 from airground.io.open_robot import open_robot
@@ -201,9 +201,12 @@ def test_without_calibration_it_says_how_to_give_one(tmp_path: Path) -> None:
         ground(write_tum(tmp_path / "kitchen"))
 
 
-def test_it_is_not_the_mavs(folder: Path) -> None:
-    with pytest.raises(RecordingError, match="no gyro"):
-        open_robot(folder, Source.MAV)
+def test_taken_for_the_mavs_it_is_grey(folder: Path) -> None:
+    recording = open_robot(folder, Source.MAV)
+    image = recording.read_image(1)
+    assert isinstance(image, MavImage)
+    assert abs(int(image.image[240, 320]) - round(0.299 * 200 + 0.587 * 100 + 0.114 * 10)) <= 1
+    assert {stamped.robot for stamped in recording.messages()} == {Source.MAV}
 
 
 def naive_pairs(first: list[int], second: list[int], limit: int) -> list[tuple[int, int]]:
