@@ -1,0 +1,118 @@
+"""The sparse map: its motions compose, keep what cameras see, and its points grow in number."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from airground.core.se3 import SE3
+from airground.slam import so3
+from airground.slam.rig_state import RigState
+from airground.slam.sparse_map import CANDIDATE, FIRST_POINTS, Keyframe, SparseMap
+from tests.slam.views import CAMERA
+
+LEVER = np.array([0.05, -0.02, -0.03])
+T_RIG_CAMERA = SE3.from_rotation_vector((3.0, 0.1, 0.2), LEVER)
+
+
+def keyframe(ids: list[int], state: RigState | None = None) -> Keyframe:
+    image = np.zeros((4, 4), np.uint8)
+    pixels = np.column_stack([ids, np.zeros(len(ids))]).astype(float)
+    depths = np.full(len(ids), np.nan)
+    numbers = np.array(ids, np.int64)
+    return Keyframe(0, image, state or RigState.at_origin(), numbers, pixels, depths)
+
+
+def some_map(seed: int = 0) -> SparseMap:
+    rng = np.random.default_rng(seed)
+    sparse_map = SparseMap()
+    for _ in range(3):
+        state = RigState.at_origin().posed(
+            SE3.from_rotation_vector(rng.normal(size=3), rng.normal(size=3))
+        )
+        sparse_map.keyframes.append(keyframe([], state))
+    ids = sparse_map.new_points(rng.uniform(0, 400, (50, 2)), 0)
+    sparse_map.place(ids, rng.normal(0, 3, (50, 3)))
+    return sparse_map
+
+
+def views(sparse_map: SparseMap) -> np.ndarray:
+    """(K, n, 2) pixels of all points in all keyframes."""
+    points = sparse_map.positions[: len(sparse_map)]
+    poses = [k.state.pose() @ T_RIG_CAMERA for k in sparse_map.keyframes]
+    return np.array([CAMERA.project(pose.inverse() @ points) for pose in poses])
+
+
+def centres(sparse_map: SparseMap) -> np.ndarray:
+    return np.array([(k.state.pose() @ T_RIG_CAMERA).translation for k in sparse_map.keyframes])
+
+
+VECTORS = st.tuples(*[st.floats(-2, 2)] * 3).map(np.array)
+SCALES = st.floats(0.2, 5.0)
+
+
+@settings(deadline=None, max_examples=30)
+@given(SCALES, VECTORS)
+def test_moving_the_map_changes_no_image_of_it(scale: float, turn: np.ndarray) -> None:
+    sparse_map = some_map()
+    before, cameras = views(sparse_map), centres(sparse_map)
+    R = so3.exp(turn)
+    sparse_map.move(scale, R, LEVER)
+    np.testing.assert_allclose(views(sparse_map), before, atol=1e-5, rtol=1e-6)
+    np.testing.assert_allclose(centres(sparse_map), scale * cameras @ R.T, atol=1e-9)
+    for moved, old in zip(sparse_map.keyframes, some_map().keyframes, strict=True):
+        # The rig stays as far from its camera as it is.
+        arm = moved.state.rotation @ T_RIG_CAMERA.translation
+        assert np.linalg.norm(arm) == pytest.approx(np.linalg.norm(LEVER))
+        np.testing.assert_allclose(moved.state.rotation, R @ old.state.rotation, atol=1e-12)
+
+
+@settings(deadline=None, max_examples=30)
+@given(SCALES, VECTORS, SCALES, VECTORS)
+def test_two_moves_are_one(s1: float, v1: np.ndarray, s2: float, v2: np.ndarray) -> None:
+    stepwise, at_once = some_map(), some_map()
+    stepwise.move(s1, so3.exp(v1), LEVER)
+    stepwise.move(s2, so3.exp(v2), LEVER)
+    at_once.move(s1 * s2, so3.exp(v2) @ so3.exp(v1), LEVER)
+    np.testing.assert_allclose(stepwise.positions, at_once.positions, atol=1e-9)
+    for a, b in zip(stepwise.keyframes, at_once.keyframes, strict=True):
+        np.testing.assert_allclose(a.state.position, b.state.position, atol=1e-9)
+        np.testing.assert_allclose(a.state.rotation, b.state.rotation, atol=1e-9)
+
+
+def test_points_keep_what_is_known_of_them_as_their_number_outgrows_the_arrays() -> None:
+    sparse_map = SparseMap()
+    rng = np.random.default_rng(1)
+    pixels = [rng.uniform(0, 400, (n, 2)) for n in (10, FIRST_POINTS, 3, 2 * FIRST_POINTS + 1)]
+    ids = [sparse_map.new_points(p, origin) for origin, p in enumerate(pixels)]
+    sparse_map.place(ids[0], np.full((10, 3), 7.0))
+    assert len(sparse_map) == sum(map(len, pixels))
+    np.testing.assert_array_equal(np.concatenate(ids), np.arange(len(sparse_map)))
+    for origin, (numbers, first) in enumerate(zip(ids, pixels, strict=True)):
+        np.testing.assert_array_equal(sparse_map.first_pixels[numbers], first)
+        assert (sparse_map.origins[numbers] == origin).all()
+    assert sparse_map.mapped(ids[0]).all()
+    assert (sparse_map.states[np.concatenate(ids[1:])] == CANDIDATE).all()
+    assert (sparse_map.positions[ids[0]] == 7.0).all()
+
+
+def test_only_points_in_the_map_are_seen_and_shared_counts_those_asked_for() -> None:
+    sparse_map = SparseMap()
+    ids = sparse_map.new_points(np.zeros((6, 2)), 0)
+    sparse_map.place(ids[:4], np.zeros((4, 3)))  # 4 and 5 stay candidates
+    sparse_map.drop(ids[1:2])
+    sparse_map.keyframes = [keyframe([3, 1, 0]), keyframe([2, 3, 4]), keyframe([5])]
+    assert sparse_map.seen_by([0, 1]).tolist() == [0, 2, 3]
+    assert sparse_map.seen_by([2]).tolist() == sparse_map.seen_by([]).tolist() == []
+    assert sparse_map.shared(np.array([0, 2, 3])).tolist() == [2, 2, 0]
+    assert sparse_map.shared(np.empty(0, np.int64)).tolist() == [0, 0, 0]
+
+
+def test_a_keyframe_forgets_and_sees_whole_observations() -> None:
+    frame = keyframe([4, 8, 6])
+    frame.forget(np.array([False, True, False]))
+    frame.see(np.array([9]), np.array([[9.0, 0.0]]), np.array([0.5]))
+    assert frame.ids.tolist() == frame.pixels[:, 0].tolist() == [4, 6, 9]
+    np.testing.assert_array_equal(frame.inverse_depths, [np.nan, np.nan, 0.5])
