@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import numpy as np
 from tyro.conf import arg
 
 from airground.errors import InputError
@@ -46,8 +45,10 @@ class AloneWords:
         if (self.front_end == "file") != (self.trajectory is not None):
             raise InputError("--front-end file and --trajectory FILE go together")
 
-    def run_one(self, recording_path: Path, out: Path, config: Config) -> None:
+    def run_one(self, recording_path: Path, out: Path, config: Config, seed: int) -> None:
         """Track one robot, write its trajectory and a summary, and print the latter."""
+        import numpy as np
+
         from airground.core.cloud import Source
         from airground.io.open_robot import open_robot
         from airground.slam import front_ends
@@ -60,7 +61,7 @@ class AloneWords:
             recording = open_robot(recording_path, robot, self.calibration)
             true_pose = true_camera(recording)
             given = front_ends.Ingredients(
-                recording.calibration, config, np.random.default_rng(self.seed), self._poses()
+                recording.calibration, config, np.random.default_rng(seed), self._poses()
             )
             front_end: FrontEnd[Any]
             if robot == Source.MAV:

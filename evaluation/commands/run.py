@@ -27,7 +27,7 @@ class Run(Verb, AloneWords, SetupWords, SeedWord, OutWord):
     def main(self) -> None:
         self.check_alone_words()
         if self.only is not None:
-            self.run_one(self.recording, self.out, self.resolved_config())
+            self.run_one(self.recording, self.out, self.resolved_config(), self.checked_seed())
         else:
             self._run_both()
 
