@@ -20,7 +20,8 @@ from evaluation.report_tables import (
     scene_table,
     timing_table,
 )
-from evaluation.results import ResultTable, Row
+from evaluation.report_trajectories import trajectory_figures, trajectory_table
+from evaluation.results import Condition, ResultTable, Row
 from evaluation.run_info import RunInfo
 from tests.evaluation.synthetic_results import BEST, DRIFT, MINMAX, PAPER, SCENES, make_table
 
@@ -100,7 +101,7 @@ def test_what_nobody_measured_has_no_row(table: ResultTable) -> None:
 def test_drift_is_shown_where_it_was_measured() -> None:
     rows = [Row("indoor_a", 1, 0, DRIFT, "trajectory", "mav_ate_se3_rmse_m", 0.0123, "m")]
     made = comparison_table(ResultTable.from_rows(rows), [DRIFT])
-    assert ("MAV poses, RMS error", "12 mm", "12.3 mm") in made.rows
+    assert ("MAV poses, live, RMS after SE3", "12 mm", "12.3 mm") in made.rows
 
 
 def test_every_failure_is_listed_with_its_reason(table: ResultTable) -> None:
@@ -154,7 +155,7 @@ def test_scenes_stand_side_by_side(table: ResultTable) -> None:
 
 def test_the_timing_table_says_what_was_not_run(table: ResultTable) -> None:
     rows = {row[0]: row for row in timing_table(table.of(BEST)).rows}
-    assert rows["Egomotion: Monocular SLAM, a frame"][1:] == ("14 (CPU)", "not run", "-", "0")
+    assert rows["Egomotion: Monocular SLAM, a frame"][1:] == ("14 (CPU)", "not run", "-", "-", "0")
     assert rows["Dense reconstruction: Fusion, 8 iterations"][1] == "800 (GPU)"
 
 
@@ -175,3 +176,34 @@ def test_lengths_are_written_for_people(value: float, text: str) -> None:
 
 def test_angles_are_written_for_people() -> None:
     assert (degrees(0.123), degrees(np.inf)) == ("0.12°", "failed")
+
+
+def test_poses_from_slam_get_figures_and_a_table_with_their_alignment() -> None:
+    condition = Condition("best", "slam", "nominal", "known")
+    rows = []
+    for seed, size in enumerate((0.004, 0.02, 0.006)):
+        where = ("indoor_a", seed, 0, condition)
+        rows += [
+            Row(*where, "trajectory", "mav_ate_se3_rmse_m", size, "m"),
+            Row(*where, "trajectory", "mav_scale_error", -size, ""),
+            Row(*where, "trajectory", "mav_path_m", 20.0, "m"),
+        ]
+        for tenth in range(30):
+            error = float("nan") if tenth < 5 else size
+            for metric in ("mav_error_m", "mav_final_error_m"):
+                time_s = tenth / 10
+                rows.append(Row(*where, "trajectory_error", metric, error, "m", time_s=time_s))
+    table = ResultTable.from_rows(rows)
+    (figure,) = trajectory_figures(table, condition)
+    assert figure.name == "fig09_mav_error"
+    titles = [axes.get_title(loc="left") for axes in figure.figure.axes]
+    assert titles == [
+        "median run (indoor_a, seed 2, flight 0): RMS 0.60 cm live, 0.60 cm final",
+        "worst run (indoor_a, seed 1, flight 0): RMS 2.00 cm live, 2.00 cm final",
+    ]
+    cells = {row[0]: row[1:] for row in trajectory_table(table, [condition]).rows}
+    assert cells["MAV: live, RMS error"] == (
+        "SE3, scale not corrected", "12 mm", "6.0 mm\nworst of 3: 20.0 mm",
+    )  # fmt: skip
+    assert cells["MAV: live, scale error (absolute)"][2] == "0.60 %\nworst of 3: 2.00 %"
+    assert not any(name.startswith("ground") for name in cells)
