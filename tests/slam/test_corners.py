@@ -59,7 +59,7 @@ def test_a_corner_with_depth_wins_against_a_stronger_one_without() -> None:
     image = np.full((240, 320), 100, np.uint8)
     image[60:75, 60:75] = 200  # without depth, sharp
     image[64:75, 84:95] = 140  # with depth, faint but well above 0.03 of the other
-    assert (40 / 100) ** 2 > NOT_PREFERRED
+    assert NOT_PREFERRED < (40 / 100) ** 2
     preferred = np.zeros(image.shape, bool)
     preferred[:, 80:] = True
     first = detect_corners(image, NOTHING, 1, 60)

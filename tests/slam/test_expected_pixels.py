@@ -57,9 +57,8 @@ def test_other_corners_go_as_if_at_the_depth_of_most() -> None:
 def test_without_any_depth_only_the_turn_counts() -> None:
     sparse_map, tracker, points = scene(0)
     turn = HERE.rotation @ SE3.from_rotation_vector((0.05, -0.1, 0.2)).rotation
-    expected = expected_pixels(
-        sparse_map, tracker, CAMERA, HERE, SE3(turn, HERE.translation + [5.0, 5.0, 0.0])
-    )
+    there = SE3(turn, HERE.translation + np.array([5.0, 5.0, 0.0]))
+    expected = expected_pixels(sparse_map, tracker, CAMERA, HERE, there)
     np.testing.assert_allclose(expected, observe(SE3(turn, HERE.translation), points), atol=0.01)
 
 

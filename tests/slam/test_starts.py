@@ -1,0 +1,200 @@
+"""How maps begin: level, at rest, or between two views; the camera is in the origin."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from airground.config import KeyframeSlam
+from airground.core.messages import ImuSamples, RobotCalibration
+from airground.core.se3 import SE3
+from airground.slam import so3
+from airground.slam.frame import Frame
+from airground.slam.inertial.preintegration import GRAVITY
+from airground.slam.motion_model import MotionModel
+from airground.slam.rig_state import RigState
+from airground.slam.starts import (
+    REST_FRAMES,
+    REST_WINDOW_NS,
+    MovingStart,
+    RestStart,
+    TwoViewWait,
+    level_start,
+)
+from tests.slam.inertial_motion import ADIS16448
+from tests.slam.mapped_room import T_RIG_CAMERA, view
+from tests.slam.synthetic_world import CAMERA
+
+TILT = so3.exp(np.array([0.05, -0.08, 0.6]))
+"""Of the IMU over the horizon, and some heading."""
+CALIBRATION = RobotCalibration(
+    CAMERA, T_RIG_CAMERA, SE3.from_rotation_vector((0.0, 0.02, 0.0), (0.1, 0.0, 0.05)), ADIS16448
+)
+WITHOUT_IMU = replace(CALIBRATION, imu=None)
+GYRO_BIAS = np.array([0.01, -0.02, 0.005])
+RATE_HZ = 200
+IMAGE = np.zeros((240, 320), np.uint8)
+
+
+def motion_of(force: np.ndarray, gyro: np.ndarray, until_s: float = 3.0) -> MotionModel:
+    """A model that knows (N, 3) samples or the same one over and over, from 0 s on."""
+    stamps = np.arange(round(until_s * RATE_HZ)) * (10**9 // RATE_HZ)
+    shape = (len(stamps), 3)
+    model = MotionModel(ADIS16448, 0)
+    model.add(
+        ImuSamples(stamps, np.broadcast_to(gyro, shape).copy(), np.broadcast_to(force, shape))
+    )
+    return model
+
+
+def assert_camera_in_origin(state: RigState) -> None:
+    T_map_camera = state.pose() @ CALIBRATION.T_imu_camera
+    np.testing.assert_allclose(T_map_camera.translation, np.zeros(3), atol=1e-12)
+    assert T_map_camera.rotation[1, 0] == pytest.approx(0.0, abs=1e-12)  # its x axis along +x
+    assert T_map_camera.rotation[0, 0] > 0.9
+
+
+def up_of(state: RigState) -> np.ndarray:
+    """The map's z axis in the rig."""
+    return state.rotation[2]
+
+
+def test_up_is_where_the_accelerometer_says() -> None:
+    model = motion_of(TILT.T @ [0, 0, GRAVITY], np.zeros(3))
+    state = level_start(model, CALIBRATION, 10**9)
+    np.testing.assert_allclose(up_of(state), TILT[2], atol=1e-12)
+    assert_camera_in_origin(state)
+    np.testing.assert_array_equal(state.velocity, np.zeros(3))
+
+
+@pytest.mark.parametrize("pushed", [[0, 0, 0.7], [0, 0, -1.0], [4.0, 0, 0]])
+def test_pushed_or_without_an_accelerometer_the_body_stands_level(pushed: list[float]) -> None:
+    level = CALIBRATION.T_body_imu.rotation[2]  # the body's z axis in the IMU
+    model = motion_of(TILT.T @ ([0, 0, GRAVITY] + np.array(pushed)), np.zeros(3))
+    early = motion_of(TILT.T @ [0, 0, GRAVITY], np.zeros(3))
+    for state in (
+        level_start(model, CALIBRATION, 10**9),
+        level_start(early, CALIBRATION, -(10**9)),  # no sample yet
+        level_start(MotionModel(None, 0), WITHOUT_IMU, 10**9),
+    ):
+        np.testing.assert_allclose(up_of(state), level, atol=1e-12)
+        assert_camera_in_origin(state)
+
+
+def observe(start: RestStart, model: MotionModel, until_s: float) -> list:
+    """Images at 30 Hz from when the window is full, as far as the first answer."""
+    for index in range(int(REST_WINDOW_NS * 3e-8), round(until_s * 30)):
+        frame = Frame(round(index * 1e9 / 30), IMAGE)
+        began = start.observe(frame, model)
+        if began is not None:
+            return [index, *began]
+    return []
+
+
+def test_it_begins_where_the_robot_left_its_place() -> None:
+    leaves_s = 1.5
+    t = np.arange(3 * RATE_HZ) / RATE_HZ
+    rng = np.random.default_rng(0)
+    noise = ADIS16448.accelerometer_noise_density * np.sqrt(RATE_HZ)
+    gyro_noise = ADIS16448.gyro_noise_density * np.sqrt(RATE_HZ)
+    up = np.clip(t - leaves_s, 0, None)[:, None] * TILT[2]  # ever faster
+    strength = GRAVITY * 1.003
+    model = motion_of(
+        strength * TILT[2] + 2.0 * up + rng.normal(0, noise, (len(t), 3)),
+        GYRO_BIAS + rng.normal(0, gyro_noise, (len(t), 3)),
+    )
+    index, frame, state = observe(RestStart(CALIBRATION), model, 3.0)
+    assert leaves_s < index / 30 < leaves_s + 0.25
+    # The map begins some images before, and still at rest.
+    assert frame.stamp_ns == round((index - REST_FRAMES) * 1e9 / 30)
+    assert frame.stamp_ns < (leaves_s + 0.05) * 1e9
+    assert_camera_in_origin(state)
+    np.testing.assert_allclose(up_of(state), TILT[2], atol=1e-3)
+    np.testing.assert_allclose(state.gyro_bias, GYRO_BIAS, atol=5e-4)
+    # Only the bias along gravity shows at rest: what is too much of it.
+    np.testing.assert_allclose(state.accelerometer_bias, (strength - GRAVITY) * TILT[2], atol=0.005)
+
+
+def test_at_rest_and_in_flight_it_waits() -> None:
+    rest = motion_of(TILT.T @ [0, 0, GRAVITY], GYRO_BIAS)
+    assert observe(RestStart(CALIBRATION), rest, 3.0) == []
+    t = np.arange(3 * RATE_HZ)[:, None] / RATE_HZ
+    sway = motion_of([0, 0, GRAVITY] + 0.3 * np.sin(6 * t), 0.05 * np.cos(5 * t) + GYRO_BIAS)
+    assert observe(RestStart(CALIBRATION), sway, 3.0) == []
+    assert observe(RestStart(WITHOUT_IMU), MotionModel(None, 0), 3.0) == []
+
+
+PLACES = [(0.9 + 0.04 * n, 0.9 - 0.02 * n) for n in range(10)]
+
+
+@cache
+def two_view_start(with_imu: bool) -> tuple[int, MovingStart]:
+    """The MAV passing over the room, level; which image ended the wait, and the start."""
+    calibration = replace(
+        CALIBRATION, imu=ADIS16448 if with_imu else None, T_body_imu=SE3.identity()
+    )
+    model = MotionModel(calibration.imu, 0)
+    stamps = np.arange(-100, 400) * 5_000_000 + 10**9
+    model.add(ImuSamples(stamps, np.zeros((500, 3)), np.broadcast_to([0.0, 0, GRAVITY], (500, 3))))
+    wait = TwoViewWait(calibration, KeyframeSlam(), np.random.default_rng(0))
+    for index, place in enumerate(PLACES):
+        start = wait.observe(Frame(10**9 + index * 10**8, view(*place).image), model)
+        if start is not None:
+            return index, start
+    raise AssertionError("no start")
+
+
+@pytest.mark.parametrize("with_imu", [True, False])
+def test_two_views_make_a_map_in_units_of_its_depth(with_imu: bool) -> None:
+    index, start = two_view_start(with_imu)
+    assert 1 <= index <= 6
+    assert start.first.stamp_ns == 10**9
+    assert start.second.stamp_ns == 10**9 + index * 10**8
+    poses = [s.pose() @ T_RIG_CAMERA for s in (start.first_state, start.second_state)]
+    truth = [view(*PLACES[n]).T_map_camera for n in (0, index)]
+    depths = (poses[0].inverse() @ start.points_map)[:, 2]
+    assert np.median(depths) == pytest.approx(1.0, abs=0.01)
+    moved = poses[0].inverse() @ poses[1]
+    true = truth[0].inverse() @ truth[1]
+    turn = SE3(moved.rotation.T @ true.rotation, np.zeros(3))
+    assert turn.angle() < np.deg2rad(1.0)
+    unit = np.linalg.norm(true.translation) / np.linalg.norm(moved.translation)
+    assert unit == pytest.approx(1.9, abs=0.15)  # the camera is 2 m over floor and boxes
+    cosine = moved.translation @ true.translation * unit / (true.translation @ true.translation)
+    assert cosine > np.cos(np.deg2rad(8.0))
+
+
+@pytest.mark.parametrize("with_imu", [True, False])
+def test_points_and_states_of_a_two_view_start_agree_and_stand_upright(with_imu: bool) -> None:
+    _, start = two_view_start(with_imu)
+    assert_camera_in_origin(start.first_state)
+    np.testing.assert_allclose(up_of(start.first_state), [0, 0, 1], atol=1e-9)
+    assert len(start.points_map) > 60
+    for state, pixels in (
+        (start.first_state, start.pixels_first),
+        (start.second_state, start.pixels_second),
+    ):
+        points = (state.pose() @ T_RIG_CAMERA).inverse() @ start.points_map
+        off = np.linalg.norm(CAMERA.project(points) - pixels, axis=1)
+        assert off.max() < 3.0
+        assert np.median(off) < 0.5
+
+
+def test_a_hovering_robot_waits_and_a_new_place_is_a_new_beginning() -> None:
+    wait = TwoViewWait(CALIBRATION, KeyframeSlam(), np.random.default_rng(0))
+    model = motion_of(np.array([0, 0, GRAVITY]), np.zeros(3))
+    stamps = iter(range(10**8, 3 * 10**9, 10**8))
+    for seed in range(4):
+        assert wait.observe(Frame(next(stamps), view(0.9, 0.9, seed=seed).image), model) is None
+    # Carried elsewhere in the dark: the first view there is the new first one.
+    assert wait.observe(Frame(next(stamps), IMAGE), model) is None
+    elsewhere = next(stamps)
+    assert wait.observe(Frame(elsewhere, view(*PLACES[0]).image), model) is None
+    start = None
+    for place in PLACES[2::2]:
+        start = start or wait.observe(Frame(next(stamps), view(*place).image), model)
+    assert start is not None
+    assert start.first.stamp_ns == elsewhere
