@@ -202,8 +202,9 @@ class KeyframeSlam:
 
     def make_upright(self, scale: float, R_new_map: NDArray[np.float64]) -> None:
         """Scale the map to metres and turn it so that z points up."""
-        self.map.move(scale, R_new_map, self.T_rig_camera.translation)
-        self.state = self.map.keyframes[-1].state
+        lever = self.T_rig_camera.translation
+        self.map.move(scale, R_new_map, lever)
+        self.state = self.state.scaled(scale, R_new_map, lever)
         self.metric = True
 
     def make_inertial(self, alignment: InertialAlignment) -> None:

@@ -45,6 +45,21 @@ class RigState:
         """The same state at another pose."""
         return replace(self, rotation=T_map_rig.rotation, position=T_map_rig.translation)
 
+    def scaled(
+        self, scale: float, rotation: NDArray[np.float64], lever: NDArray[np.float64]
+    ) -> RigState:
+        """The same state after the map was scaled and then turned about its origin.
+
+        Args:
+            scale: Of all distances but that between rig and camera, which is known in metres.
+            rotation: (3, 3) after scaling.
+            lever: (3,) place of the camera in the rig.
+        """
+        turned = nearest_rotation(rotation @ self.rotation)
+        camera = scale * rotation @ (self.position + self.rotation @ lever)
+        velocity = scale * rotation @ self.velocity
+        return replace(self, rotation=turned, position=camera - turned @ lever, velocity=velocity)
+
     def moved(self, T_new_map: SE3) -> RigState:
         """The same state after the map moved."""
         return replace(

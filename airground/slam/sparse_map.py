@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,17 +115,8 @@ class SparseMap:
         return np.array([int(wanted[keyframe.ids].sum()) for keyframe in self.keyframes])
 
     def move(self, scale: float, rotation: NDArray[np.float64], lever: NDArray[np.float64]) -> None:
-        """Scale and turn the whole map about its origin.
-
-        Args:
-            scale: Of all distances but that between rig and camera, which is known in metres.
-            rotation: (3, 3) after scaling.
-            lever: (3,) place of the camera in the rig.
-        """
+        """Scale and turn the whole map about its origin, as `RigState.scaled` does a state."""
         for keyframe in self.keyframes:
-            state = keyframe.state
-            turned = rotation @ state.rotation
-            camera = scale * rotation @ (state.position + state.rotation @ lever)
-            keyframe.state = replace(state, rotation=turned, position=camera - turned @ lever)
+            keyframe.state = keyframe.state.scaled(scale, rotation, lever)
         n = self._count
         self.positions[:n] = scale * self.positions[:n] @ rotation.T

@@ -73,7 +73,7 @@ def test_up_is_where_the_accelerometer_says() -> None:
 @pytest.mark.parametrize("pushed", [[0, 0, 0.7], [0, 0, -1.0], [4.0, 0, 0]])
 def test_pushed_or_without_an_accelerometer_the_body_stands_level(pushed: list[float]) -> None:
     level = CALIBRATION.T_body_imu.rotation[2]  # the body's z axis in the IMU
-    model = motion_of(TILT.T @ ([0, 0, GRAVITY] + np.array(pushed)), np.zeros(3))
+    model = motion_of(TILT.T @ np.add([0, 0, GRAVITY], pushed), np.zeros(3))
     early = motion_of(TILT.T @ [0, 0, GRAVITY], np.zeros(3))
     for state in (
         level_start(model, CALIBRATION, 10**9),
