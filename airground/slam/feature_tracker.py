@@ -36,6 +36,11 @@ class FeatureTracker:
         self.pixels = NOTHING
         self.failures = np.empty(0, np.int64)
 
+    def restart(self, image: NDArray[np.uint8]) -> None:
+        """Follow nothing any more, and go on from this image."""
+        self.clear()
+        self.image = image
+
     def advance(self, image: NDArray[np.uint8], start: NDArray, extra_levels: int = 0) -> None:
         """Follow every corner into the next image; those not found are given up.
 

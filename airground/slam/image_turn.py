@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.camera import PinholeCamera
+from airground.slam import so3
 
 SMALL_WIDTH = 160
 MIN_RESPONSE = 0.15
@@ -47,3 +48,24 @@ class ImageTurn:
         about_y = -np.arctan2(right * self._factor, self._camera.fx)
         about_x = np.arctan2(down * self._factor, self._camera.fy)
         return np.array([about_x, about_y])
+
+    def rig_turn(
+        self,
+        image: NDArray[np.uint8],
+        last_turn: NDArray[np.float64],
+        R_rig_camera: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """(3, 3) turn of the rig to the next image; about the optical axis as last time.
+
+        Args:
+            image: (height, width) grey, the next one.
+            last_turn: (3, 3) of the rig, to the image before; the answer where images do not
+                tell.
+            R_rig_camera: (3, 3).
+        """
+        slide = self.follow(image)
+        if slide is None:
+            return last_turn
+        about = so3.log(R_rig_camera.T @ last_turn @ R_rig_camera)
+        turn = so3.exp(np.array([slide[0], slide[1], about[2]]))
+        return R_rig_camera @ turn @ R_rig_camera.T

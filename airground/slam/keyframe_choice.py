@@ -7,8 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from airground.config import KeyframeSlam
 from airground.core.camera import PinholeCamera
+from airground.core.se3 import SE3
 from airground.slam.feature_tracker import FeatureTracker
+from airground.slam.rig_state import RigState
 from airground.slam.sparse_map import Keyframe, SparseMap
 
 
@@ -25,6 +28,49 @@ class News:
     share_left: float
     mapped_left: float
     parallax_px: float
+
+
+class KeyframeChoice:
+    """Chooses the images that stay.
+
+    Args:
+        sparse_map: With the keyframes so far.
+        camera, T_rig_camera: The robot's camera.
+        parameters: Of its SLAM.
+    """
+
+    def __init__(
+        self,
+        sparse_map: SparseMap,
+        camera: PinholeCamera,
+        T_rig_camera: SE3,
+        parameters: KeyframeSlam,
+    ) -> None:
+        self._map = sparse_map
+        self._camera = camera
+        self._R_rig_camera = T_rig_camera.rotation
+        self._parameters = parameters
+
+    def wanted(self, tracker: FeatureTracker, state: RigState, stamp_ns: int, timed: bool) -> bool:
+        """Whether the newest image shows enough that the last keyframe did not.
+
+        Args:
+            tracker: Stands at the newest image.
+            state: Of the rig there.
+            stamp_ns: Of the image.
+            timed: Whether a keyframe is due now and then, even if nothing is new.
+        """
+        last, parameters = self._map.keyframes[-1], self._parameters
+        if timed and (stamp_ns - last.stamp_ns) * 1e-9 >= parameters.keyframe_interval_s:
+            return True
+        last_view = last.state.rotation @ self._R_rig_camera
+        turn = last_view.T @ state.rotation @ self._R_rig_camera
+        news = what_is_new(self._map, last, tracker, turn, self._camera)
+        return (
+            news.share_left < parameters.keyframe_share
+            or news.mapped_left < parameters.keyframe_share
+            or news.parallax_px > parameters.keyframe_parallax_px
+        )
 
 
 def what_is_new(

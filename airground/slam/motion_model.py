@@ -13,6 +13,9 @@ from airground.slam.rig_state import RigState
 
 MAX_GAP_S = 0.04
 """Inertial samples farther apart than this have a hole between them: a robot shakes faster."""
+MAX_COAST_S = 3.0
+"""For this long a robot is believed to go on without a look at the scene. Inertial dead
+reckoning drifts by centimetres meanwhile; others may have stopped or turned off."""
 ROTATION_SIGMA = 2e-3
 """What the gyro leaves open from image to image: clock, mounting and bias [rad]."""
 
@@ -92,3 +95,20 @@ class MotionModel:
         )
         predicted = replace(state, rotation=rotation, position=position, velocity=velocity)
         return Prediction(predicted, ROTATION_SIGMA, True)
+
+    def coasted(self, before: RigState, prediction: Prediction, unseen_s: float) -> RigState:
+        """The state at an image that shows nothing: a robot goes on for a while.
+
+        Args:
+            before: The state at the image before.
+            prediction: From there.
+            unseen_s: How long nothing was seen [s].
+        """
+        state = prediction.state
+        if unseen_s > MAX_COAST_S:
+            turned = before if prediction.rotation_sigma is None else state
+            return replace(before, rotation=turned.rotation, velocity=np.zeros(3))
+        if prediction.inertial:
+            return state
+        # What drives along a curve turns its velocity with it.
+        return replace(state, velocity=state.rotation @ before.rotation.T @ before.velocity)

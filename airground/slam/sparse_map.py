@@ -7,9 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from airground.core.se3 import SE3
 from airground.slam.rig_state import RigState
 
 FIRST_POINTS = 4096
+DEPTH_RANGE_PERCENT = 2.0
+"""This share of the points at either end is left out of a depth range: some are wrong."""
 CANDIDATE, MAPPED, DROPPED = 0, 1, 2
 """State of a point: seen but without a position yet, in the map, found to be wrong."""
 
@@ -113,6 +116,23 @@ class SparseMap:
         wanted = np.zeros(len(self.states), bool)
         wanted[ids] = True
         return np.array([int(wanted[keyframe.ids].sum()) for keyframe in self.keyframes])
+
+    def depth_range(
+        self, ids: NDArray[np.int64], T_map_camera: SE3, least: int
+    ) -> tuple[float, float] | None:
+        """Nearest and farthest of the points in a view, along its optical axis [m].
+
+        Args:
+            ids: Points seen; only those in the map count.
+            T_map_camera: The view.
+            least: With fewer of them there is no range.
+        """
+        ids = ids[self.mapped(ids)]
+        if len(ids) < least:
+            return None
+        z = (T_map_camera.inverse() @ self.positions[ids])[:, 2]
+        low, high = np.percentile(z, [DEPTH_RANGE_PERCENT, 100 - DEPTH_RANGE_PERCENT])
+        return (float(low), float(high)) if low > 0 else None
 
     def move(self, scale: float, rotation: NDArray[np.float64], lever: NDArray[np.float64]) -> None:
         """Scale and turn the whole map about its origin, as `RigState.scaled` does a state."""
