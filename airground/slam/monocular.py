@@ -39,7 +39,7 @@ class MonocularSlam:
         slam_rng, start_rng = rng.spawn(2)
         self._slam = KeyframeSlam(calibration, config.monocular_slam, slam_rng)
         self._tight = config.monocular_slam.scale == "tight"
-        self._scale = TightScale(self._slam) if self._tight else FilteredScale(self._slam)
+        self._scale = self._unknown_scale()
         self._rest = RestStart(calibration)
         self._two_views = TwoViewWait(calibration, config.monocular_slam, start_rng)
         self._given_out = False
@@ -59,7 +59,7 @@ class MonocularSlam:
         corrected |= self._scale.update(fit is not None)
         if not self._given_out:
             if slam.unseen_s() > MAX_UNSEEN_S:
-                slam.reset()
+                self._give_up()
             if fit is None or fit.inliers.sum() < MIN_TRACKED or not self._scale.known:
                 return self._initializing(frame)
             self._given_out = True
@@ -96,6 +96,15 @@ class MonocularSlam:
         moving = self._two_views.observe(frame, self._slam.motion)
         if moving is not None:
             self._slam.begin_moving(moving)
+
+    def _give_up(self) -> None:
+        """Forget the map, and all that was known of its unit."""
+        self._slam.reset()
+        self._slam.metric = self._slam.inertial = False
+        self._scale = self._unknown_scale()
+
+    def _unknown_scale(self) -> TightScale | FilteredScale:
+        return TightScale(self._slam) if self._tight else FilteredScale(self._slam)
 
     def _initializing(self, frame: Frame) -> TrackedPose:
         return TrackedPose(frame.stamp_ns, Tracking.INITIALIZING, None, scale=self._scale.estimate)
