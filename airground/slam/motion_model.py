@@ -51,11 +51,15 @@ class MotionModel:
         if self.buffer is not None:
             self.buffer.add(samples)
 
+    def imu_time(self, stamp_ns: int) -> int:
+        """A stamp of the camera on the IMU's clock [ns]."""
+        return stamp_ns + self._offset_ns
+
     def preintegrate(self, start_ns: int, end_ns: int, state: RigState) -> Preintegration | None:
         """Inertial motion between two images; None where samples are missing."""
         if self.buffer is None:
             return None
-        start, end = start_ns + self._offset_ns, end_ns + self._offset_ns
+        start, end = self.imu_time(start_ns), self.imu_time(end_ns)
         if not self.buffer.covers(start, end):
             return None
         motion = self.buffer.preintegrate(start, end, state.gyro_bias, state.accelerometer_bias)

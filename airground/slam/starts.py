@@ -40,7 +40,8 @@ def level_start(motion: MotionModel, calibration: RobotCalibration, stamp_ns: in
     """
     up = calibration.T_body_imu.rotation.T[:, 2]
     if motion.buffer is not None:
-        means = motion.buffer.mean_between(stamp_ns - LEVEL_WINDOW_NS, stamp_ns)
+        now = motion.imu_time(stamp_ns)
+        means = motion.buffer.mean_between(now - LEVEL_WINDOW_NS, now)
         if means is not None and abs(np.linalg.norm(means[1]) - GRAVITY) < MAX_OFF_GRAVITY:
             up = means[1]
     rotation = gravity_aligned(up, calibration.T_imu_camera.rotation[:, 0])
@@ -68,7 +69,8 @@ class RestStart:
         noise = self._calibration.imu
         if motion.buffer is None or noise is None:
             return None
-        samples = motion.buffer.between(frame.stamp_ns - REST_WINDOW_NS, frame.stamp_ns)
+        now = motion.imu_time(frame.stamp_ns)
+        samples = motion.buffer.between(now - REST_WINDOW_NS, now)
         rest = at_rest(samples, noise)
         if rest is None:
             began = self._resting[0] if self._resting else None

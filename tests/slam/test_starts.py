@@ -39,11 +39,14 @@ RATE_HZ = 200
 IMAGE = np.zeros((240, 320), np.uint8)
 
 
-def motion_of(force: np.ndarray, gyro: np.ndarray, until_s: float = 3.0) -> MotionModel:
-    """A model that knows (N, 3) samples or the same one over and over, from 0 s on."""
-    stamps = np.arange(round(until_s * RATE_HZ)) * (10**9 // RATE_HZ)
+def motion_of(force: np.ndarray, gyro: np.ndarray, clock_ns: int = 0) -> MotionModel:
+    """A model that knows 3 s of (N, 3) samples or the same one over and over.
+
+    They begin at 0 s of the camera's clock.
+    """
+    stamps = np.arange(3 * RATE_HZ) * (10**9 // RATE_HZ) + clock_ns
     shape = (len(stamps), 3)
-    model = MotionModel(ADIS16448, 0)
+    model = MotionModel(ADIS16448, clock_ns)
     model.add(
         ImuSamples(stamps, np.broadcast_to(gyro, shape).copy(), np.broadcast_to(force, shape))
     )
@@ -62,8 +65,9 @@ def up_of(state: RigState) -> np.ndarray:
     return state.rotation[2]
 
 
-def test_up_is_where_the_accelerometer_says() -> None:
-    model = motion_of(TILT.T @ [0, 0, GRAVITY], np.zeros(3))
+@pytest.mark.parametrize("clock_ns", [0, 10**10])
+def test_up_is_where_the_accelerometer_says(clock_ns: int) -> None:
+    model = motion_of(TILT.T @ [0, 0, GRAVITY], np.zeros(3), clock_ns)
     state = level_start(model, CALIBRATION, 10**9)
     np.testing.assert_allclose(up_of(state), TILT[2], atol=1e-12)
     assert_camera_in_origin(state)
@@ -94,7 +98,8 @@ def observe(start: RestStart, model: MotionModel, until_s: float) -> list:
     return []
 
 
-def test_it_begins_where_the_robot_left_its_place() -> None:
+@pytest.mark.parametrize("clock_ns", [0, 10**10])
+def test_it_begins_where_the_robot_left_its_place(clock_ns: int) -> None:
     leaves_s = 1.5
     t = np.arange(3 * RATE_HZ) / RATE_HZ
     rng = np.random.default_rng(0)
@@ -105,6 +110,7 @@ def test_it_begins_where_the_robot_left_its_place() -> None:
     model = motion_of(
         strength * TILT[2] + 2.0 * up + rng.normal(0, noise, (len(t), 3)),
         GYRO_BIAS + rng.normal(0, gyro_noise, (len(t), 3)),
+        clock_ns,
     )
     index, frame, state = observe(RestStart(CALIBRATION), model, 3.0)
     assert leaves_s < index / 30 < leaves_s + 0.25
