@@ -15,8 +15,8 @@ from airground.config import KeyframeSlam as Parameters
 from airground.core.messages import ImuSamples, RobotCalibration
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
-from airground.slam import so3
 from airground.slam.depth_lookup import inverse_depths_at
+from airground.slam.doubt import Doubt, jumps, surprising
 from airground.slam.expected_pixels import expected_pixels
 from airground.slam.feature_tracker import FeatureTracker
 from airground.slam.frame import Frame
@@ -24,7 +24,7 @@ from airground.slam.frame_pose import frame_pose
 from airground.slam.geometry.pose_estimation import PoseFit
 from airground.slam.image_turn import ImageTurn
 from airground.slam.inertial.alignment import InertialAlignment
-from airground.slam.keyframe_choice import what_is_new
+from airground.slam.keyframe_choice import KeyframeChoice
 from airground.slam.local_mapping import LocalMapper, NewKeyframe
 from airground.slam.map_adjustment import MapAdjuster
 from airground.slam.motion_model import MotionModel, Prediction
@@ -32,20 +32,16 @@ from airground.slam.recovery import Recovery
 from airground.slam.rig_state import RigState
 from airground.slam.sparse_map import SparseMap
 from airground.slam.starts import MovingStart
+from airground.slam.tracked_path import TrackedPath
 
 PATIENCE = 2
 """A point that fits the pose badly in this many images in a row is given up."""
 GUIDED_LEVELS, UNGUIDED_LEVELS = 1, 3
 """Pyramid levels above the image: a gyro tells where corners go, constant motion guesses."""
-MAX_COAST_S = 3.0
-"""Inertial dead reckoning without a look at the scene drifts by centimetres in this time."""
 FIRST_GLOBAL_ADJUSTMENT = 8
 """The whole map is adjusted at this many keyframes, and whenever it has grown by half: what
 the beginning got wrong shows only later, and would bend all that stands on it."""
 GLOBAL_ADJUSTMENT_GROWTH = 1.3
-MAX_JUMP_M = 0.25
-"""No robot here moves so far between prediction and measurement from image to image."""
-DEPTH_RANGE_PERCENT = 2.0
 
 
 class KeyframeSlam:
@@ -86,7 +82,7 @@ class KeyframeSlam:
         self.metric = self.inertial = False
         self._inverse_depth_sigma, self._max_depth_m = inverse_depth_sigma, max_depth_m
         self._rng = rng
-        self._tracked: list[tuple[int, int, SE3]] = []
+        self.path = TrackedPath()
         self.reset()
 
     def reset(self) -> None:
@@ -99,20 +95,14 @@ class KeyframeSlam:
         self._seen_ns = 0
         self._next_global = FIRST_GLOBAL_ADJUSTMENT
         self._keyframe_covariance = np.zeros((6, 6))
-        self._tracked.clear()
-        self.adjuster = MapAdjuster(
-            self.map, self.camera, self.T_rig_camera, self.parameters, self._inverse_depth_sigma
-        )
-        self._mapper = LocalMapper(
-            self.map,
-            self.tracker,
-            self.adjuster,
-            self.camera,
-            self.T_rig_camera,
-            self.parameters,
-            self._max_depth_m,
-        )
-        self._recovery = Recovery(self.map, self.camera, self.T_rig_camera, self.parameters)
+        self._doubt: Doubt | None = None
+        self._torn = False
+        self.path.clear()
+        own = self.camera, self.T_rig_camera, self.parameters
+        self.adjuster = MapAdjuster(self.map, *own, self._inverse_depth_sigma)
+        self._mapper = LocalMapper(self.map, self.tracker, self.adjuster, *own, self._max_depth_m)
+        self._recovery = Recovery(self.map, *own)
+        self._choice = KeyframeChoice(self.map, *own)
 
     def add_imu(self, samples: ImuSamples) -> None:
         self.motion.add(samples)
@@ -124,22 +114,19 @@ class KeyframeSlam:
 
     def begin(self, frame: Frame, state: RigState, still: bool) -> None:
         """Start the map with this image as its first keyframe."""
-        self.tracker.clear()
-        self.tracker.advance(frame.image, self.tracker.pixels)
+        self.tracker.restart(frame.image)
         self.state, self.stamp_ns, self._seen_ns = state, frame.stamp_ns, frame.stamp_ns
         self._insert(frame, still=still)
 
     def begin_moving(self, start: MovingStart) -> None:
         """Start the map with two views; its unit is the first one's median depth."""
-        self.tracker.clear()
-        self.tracker.advance(start.first.image, self.tracker.pixels)
+        self.tracker.restart(start.first.image)
         ids = self.map.new_points(start.pixels_first, 0)
         self.map.place(ids, start.points_map)
         self.tracker.add(ids, start.pixels_first)
         self.state, self.stamp_ns = start.first_state, start.first.stamp_ns
         self._insert(start.first)
-        self.tracker.clear()
-        self.tracker.advance(start.second.image, self.tracker.pixels)
+        self.tracker.restart(start.second.image)
         self.tracker.add(ids, start.pixels_second)
         self.state, self.stamp_ns = start.second_state, start.second.stamp_ns
         self._seen_ns = start.second.stamp_ns
@@ -152,30 +139,35 @@ class KeyframeSlam:
             The fit of the newest pose, None where the image did not give one; and whether
             the map was adjusted as a whole.
         """
-        assert self.stamp_ns is not None
-        turn = self._guessed_turn(frame)
-        prediction = self.motion.predict(
-            self.state, turn, self.stamp_ns, frame.stamp_ns, self.inertial
-        )
+        turn = self._turn
+        if self._image_turn is not None:
+            turn = self._image_turn.rig_turn(frame.image, turn, self.T_rig_camera.rotation)
+        prediction = self._predict(frame, turn)
         lost = self._seen_ns != self.stamp_ns
         there = prediction.state.pose() @ self.T_rig_camera
         expected = expected_pixels(self.map, self.tracker, self.camera, self.T_map_camera(), there)
         self.tracker.advance(frame.image, expected, 2 if lost else 0)
         fit = self._fit(frame, prediction)
+        if fit is None and self._doubt is not None:
+            self._go_back(self._doubt, frame)
+            prediction = self._predict(frame, turn)
+        elif self._doubt is not None:
+            self._doubt.confirmations += 1
         if fit is None:
             fit = self._recover(frame, prediction)
         self._move_on(frame, prediction, fit)
-        if fit is None and not (prediction.inertial and not self._tracked):
+        if self._in_doubt():
             return None, False
-        if self._wants_keyframe():
+        if fit is None and not (prediction.inertial and not len(self.path)):
+            return None, False
+        timed = self.metric and self.calibration.imu is not None
+        if self._choice.wanted(self.tracker, self.state, frame.stamp_ns, timed):
             return fit, self._insert(frame)
         return fit, False
 
     def note(self, stamp_ns: int) -> None:
         """Remember the newest pose as one of the trajectory."""
-        index = len(self.map.keyframes) - 1
-        T_keyframe_map = self.map.keyframes[index].state.pose().inverse()
-        self._tracked.append((stamp_ns, index, T_keyframe_map @ self.T_map_camera()))
+        self.path.note(stamp_ns, self.T_map_camera(), self.map.keyframes)
 
     def T_map_camera(self) -> SE3:
         """The newest pose of the camera."""
@@ -183,21 +175,21 @@ class KeyframeSlam:
 
     def trajectory(self) -> Trajectory | None:
         """Every image noted, hung on its keyframe where that is now."""
-        if not self._tracked:
-            return None
-        keyframes = [keyframe.state.pose() for keyframe in self.map.keyframes]
-        poses = [keyframes[k] @ T for _, k, T in self._tracked]
-        return Trajectory.from_poses([stamp for stamp, _, _ in self._tracked], poses)
+        return self.path.trajectory(self.map.keyframes)
 
     def adjust_all(self) -> None:
         """Adjust the whole map and go on from its newest keyframe."""
-        newest = self.map.keyframes[-1]
-        T_before_map = newest.state.pose().inverse()
+        before = self.map.keyframes[-1].state.pose()
         self.adjuster.adjust_all(self.inertial)
+        self._follow_newest(before)
+
+    def _follow_newest(self, T_map_before: SE3) -> None:
+        """Go on from the newest keyframe, which moved."""
+        newest = self.map.keyframes[-1].state
         self.state = replace(
-            self.state.moved(newest.state.pose() @ T_before_map),
-            gyro_bias=newest.state.gyro_bias,
-            accelerometer_bias=newest.state.accelerometer_bias,
+            self.state.moved(newest.pose() @ T_map_before.inverse()),
+            gyro_bias=newest.gyro_bias,
+            accelerometer_bias=newest.accelerometer_bias,
         )
 
     def make_upright(self, scale: float, R_new_map: NDArray[np.float64]) -> None:
@@ -232,21 +224,13 @@ class KeyframeSlam:
 
     def depth_range(self) -> tuple[float, float] | None:
         """Nearest and farthest map point in the newest image [m]."""
-        ids = self.tracker.ids[self.map.mapped(self.tracker.ids)]
-        if len(ids) < self.parameters.min_points:
-            return None
-        z = (self.T_map_camera().inverse() @ self.map.positions[ids])[:, 2]
-        low, high = np.percentile(z, [DEPTH_RANGE_PERCENT, 100 - DEPTH_RANGE_PERCENT])
-        return (float(low), float(high)) if low > 0 else None
+        return self.map.depth_range(
+            self.tracker.ids, self.T_map_camera(), self.parameters.min_points
+        )
 
-    def _guessed_turn(self, frame: Frame) -> NDArray[np.float64]:
-        """(3, 3) turn of the rig to the next image, for want of a gyro."""
-        slide = None if self._image_turn is None else self._image_turn.follow(frame.image)
-        if slide is None:
-            return self._turn
-        R = self.T_rig_camera.rotation
-        about = so3.log(R.T @ self._turn @ R)
-        return R @ so3.exp(np.array([slide[0], slide[1], about[2]])) @ R.T
+    def _predict(self, frame: Frame, turn: NDArray[np.float64]) -> Prediction:
+        assert self.stamp_ns is not None
+        return self.motion.predict(self.state, turn, self.stamp_ns, frame.stamp_ns, self.inertial)
 
     def _fit(self, frame: Frame, prediction: Prediction) -> PoseFit | None:
         """The pose by the map points that were followed into this image."""
@@ -256,11 +240,12 @@ class KeyframeSlam:
         depths = None
         if frame.depth is not None:
             depths = inverse_depths_at(frame.depth, pixels, self._max_depth_m)
+        expected = prediction.state.pose() @ self.T_rig_camera
         fit = frame_pose(
             self.map.positions[ids],
             pixels,
             self.camera,
-            prediction.state.pose() @ self.T_rig_camera,
+            expected,
             sigma_px=self.parameters.corner_sigma_px,
             rotation_sigma=prediction.rotation_sigma,
             inertial=prediction.inertial,
@@ -269,31 +254,43 @@ class KeyframeSlam:
             inverse_depths=depths,
             inverse_depth_sigma=self._inverse_depth_sigma,
         )
-        if fit is None or self._jumps(fit, prediction):
+        if fit is None or (self.metric and jumps(fit.T_map_camera, expected)):
             return None
         self.tracker.judge(ids, fit.inliers, PATIENCE)
         return fit
 
-    def _jumps(self, fit: PoseFit, prediction: Prediction) -> bool:
-        """Whether a pose is too far from where inertia would have carried the robot."""
-        if not self.metric:
-            return False
-        expected = prediction.state.pose() @ self.T_rig_camera
-        off = fit.T_map_camera.translation - expected.translation
-        return float(np.linalg.norm(off)) > MAX_JUMP_M
-
     def _recover(self, frame: Frame, prediction: Prediction) -> PoseFit | None:
         """Look for the map where it should be, then anywhere."""
-        if not self._tracked:
+        if not len(self.path):
             return None
+        assert self.stamp_ns is not None
         expected = prediction.state.pose() @ self.T_rig_camera
-        found = self._recovery.near(frame.image, expected) or self._recovery.anywhere(frame.image)
+        found = self._recovery.near(frame.image, expected, prediction.rotation_sigma is not None)
+        found = found or self._recovery.anywhere(frame.image)
         if found is None:
             return None
-        self.tracker.clear()
-        self.tracker.advance(frame.image, self.tracker.pixels)
+        if surprising(found.fit.T_map_camera, expected, (frame.stamp_ns - self._seen_ns) * 1e-9):
+            there = self.state.posed(found.fit.T_map_camera @ self.T_rig_camera.inverse())
+            self._doubt = Doubt(self.state, self.stamp_ns, self._seen_ns, there, frame.stamp_ns)
+        self.tracker.restart(frame.image)
         self.tracker.add(found.ids, found.pixels)
         return found.fit
+
+    def _go_back(self, doubt: Doubt, frame: Frame) -> None:
+        """Forget a place that images do not confirm."""
+        self.state, self.stamp_ns, self._seen_ns = doubt.state, doubt.stamp_ns, doubt.seen_ns
+        self._doubt = None
+        self.tracker.restart(frame.image)
+
+    def _in_doubt(self) -> bool:
+        """Whether the newest pose still waits to be confirmed."""
+        if self._doubt is None or not self._doubt.settled:
+            return self._doubt is not None
+        assert self.stamp_ns is not None
+        # Inertia did not bring the robot here, and must not draw it back.
+        self.state = self._doubt.with_velocity(self.state, self.stamp_ns)
+        self._doubt, self._torn = None, True
+        return False
 
     def _move_on(self, frame: Frame, prediction: Prediction, fit: PoseFit | None) -> None:
         """The state at this image: as measured, or else as predicted."""
@@ -308,34 +305,19 @@ class KeyframeSlam:
                 followed = self._seen_ns == self.stamp_ns
                 state = replace(state, velocity=step / seconds if followed else np.zeros(3))
             self._seen_ns = frame.stamp_ns
-        elif not prediction.inertial or coasted_s > MAX_COAST_S:
-            state = replace(before, velocity=np.zeros(3))
+        else:
+            state = self.motion.coasted(before, prediction, coasted_s)
         self._turn = before.rotation.T @ state.rotation
         self.state, self.stamp_ns = state, frame.stamp_ns
-
-    def _wants_keyframe(self) -> bool:
-        """Whether the newest image shows enough that the last keyframe did not."""
-        assert self.stamp_ns is not None
-        last, parameters = self.map.keyframes[-1], self.parameters
-        timed = self.metric and self.calibration.imu is not None
-        if timed and (self.stamp_ns - last.stamp_ns) * 1e-9 >= parameters.keyframe_interval_s:
-            return True
-        view = self.state.rotation @ self.T_rig_camera.rotation
-        last_view = last.state.rotation @ self.T_rig_camera.rotation
-        news = what_is_new(self.map, last, self.tracker, last_view.T @ view, self.camera)
-        return (
-            news.share_left < parameters.keyframe_share
-            or news.mapped_left < parameters.keyframe_share
-            or news.parallax_px > parameters.keyframe_parallax_px
-        )
 
     def _insert(self, frame: Frame, still: bool = False) -> bool:
         """Make the newest image a keyframe; returns whether the whole map was adjusted."""
         motion = None
-        if self.map.keyframes:
+        if self.map.keyframes and not self._torn:
             motion = self.motion.preintegrate(
                 self.map.keyframes[-1].stamp_ns, frame.stamp_ns, self.state
             )
+        self._torn = False
         new = NewKeyframe(frame.stamp_ns, frame.image, frame.depth, self.state, motion, still)
         covariance = self._mapper.insert(new, self.inertial)
         if covariance is not None:

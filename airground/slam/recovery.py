@@ -17,6 +17,10 @@ from airground.slam.sparse_map import SparseMap
 
 MIN_FOUND = 20
 """Map points that must agree before a robot believes to be back."""
+MIN_FOUND_TURN_KNOWN = 12
+"""The same where a gyro tells how the camera is turned: fewer agree by chance."""
+TURN_SIGMA = 0.02
+"""What a gyro leaves open while nothing is seen [rad]."""
 LEVELS = 3
 KEYFRAMES = 3
 
@@ -64,14 +68,23 @@ class Recovery:
         keyframe = self._map.keyframes[number]
         self._index.add(number, keyframe.image, keyframe.ids, keyframe.pixels)
 
-    def near(self, image: NDArray[np.uint8], T_map_camera: SE3) -> Found | None:
-        """Look where the map should be if the camera is about there."""
+    def near(
+        self, image: NDArray[np.uint8], T_map_camera: SE3, turn_known: bool = False
+    ) -> Found | None:
+        """Look where the map should be if the camera is about there.
+
+        Args:
+            image: (height, width) grey.
+            T_map_camera: About where it was taken.
+            turn_known: Whether a gyro says how the camera is turned.
+        """
+        least = MIN_FOUND_TURN_KNOWN if turn_known else MIN_FOUND
         count = len(self._map.keyframes)
         ids = self._map.seen_by(list(range(count)))
         expected, inside = visible(self._map.positions[ids], T_map_camera, self._camera)
         ids, expected = ids[inside], expected[inside]
         chosen = keyframes_in_view(
-            self._map, range(count), T_map_camera, self._T_rig_camera, ids, KEYFRAMES, MIN_FOUND
+            self._map, range(count), T_map_camera, self._T_rig_camera, ids, KEYFRAMES, least
         )
         found_ids: list[NDArray[np.int64]] = []
         found_px: list[NDArray[np.float32]] = []
@@ -84,9 +97,10 @@ class Recovery:
             found_px.append(pixels)
             left = ~np.isin(ids, again)
             ids, expected = ids[left], expected[left]
-        if sum(map(len, found_ids)) < MIN_FOUND:
+        if sum(map(len, found_ids)) < least:
             return None
-        return self._agreed(np.concatenate(found_ids), np.concatenate(found_px), T_map_camera)
+        again, found = np.concatenate(found_ids), np.concatenate(found_px)
+        return self._agreed(again, found, T_map_camera, least, TURN_SIGMA if turn_known else None)
 
     def anywhere(self, image: NDArray[np.uint8]) -> Found | None:
         """Compare the image with all keyframes."""
@@ -98,11 +112,18 @@ class Recovery:
         """(n, 3) positions of points, NaN where they have none."""
         return np.where(self._map.mapped(ids)[:, None], self._map.positions[ids], np.nan)
 
-    def _agreed(self, ids: NDArray, pixels: NDArray, T_map_camera: SE3) -> Found | None:
+    def _agreed(
+        self,
+        ids: NDArray,
+        pixels: NDArray,
+        T_map_camera: SE3,
+        least: int,
+        rotation_sigma: float | None,
+    ) -> Found | None:
         """The pose by points that were found, if they agree."""
         placed = self._map.mapped(ids)
         ids, pixels = ids[placed], pixels[placed].astype(np.float64)
-        if len(ids) < MIN_FOUND:
+        if len(ids) < least:
             return None
         fit = estimate_pose(
             self._map.positions[ids],
@@ -110,10 +131,10 @@ class Recovery:
             np.full(len(ids), self._parameters.corner_sigma_px),
             self._camera,
             T_map_camera,
-            rotation_sigma=None,
+            rotation_sigma=rotation_sigma,
             position_sigma=None,
         )
         good = fit.inliers
-        if good.sum() < MIN_FOUND or good.mean() < 0.5:
+        if good.sum() < least or good.mean() < 0.5:
             return None
         return Found(ids[good], pixels[good], fit)
