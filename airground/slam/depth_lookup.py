@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+REACH_PX = 4
 MAX_SPREAD = 0.05
-"""Corners like to sit on silhouettes: where depth varies more than this share of it within a
-pixel's neighbours, it may belong to either side."""
+"""Corners like to sit on silhouettes, and colour and depth are not taken at the same moment:
+where depth varies more than this share of it within reach, it may belong to either side."""
 
 
 def inverse_depths_at(
@@ -21,9 +22,10 @@ def inverse_depths_at(
         max_depth_m: Depth beyond this is not used.
     """
     height, width = depth.shape
-    x = np.rint(pixels[:, 0]).astype(np.int64).clip(1, width - 2)
-    y = np.rint(pixels[:, 1]).astype(np.int64).clip(1, height - 2)
-    offsets = np.array([(dx, dy) for dy in (-1, 0, 1) for dx in (-1, 0, 1)])
+    x = np.rint(pixels[:, 0]).astype(np.int64).clip(REACH_PX, width - 1 - REACH_PX)
+    y = np.rint(pixels[:, 1]).astype(np.int64).clip(REACH_PX, height - 1 - REACH_PX)
+    steps = (-REACH_PX, -1, 0, 1, REACH_PX)
+    offsets = np.array([(dx, dy) for dy in steps for dx in steps])
     around = depth[y[:, None] + offsets[:, 1], x[:, None] + offsets[:, 0]].astype(np.float64)
     middle = np.median(around, axis=1)
     with np.errstate(invalid="ignore"):

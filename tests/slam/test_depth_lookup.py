@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from airground.slam.depth_lookup import MAX_SPREAD, inverse_depths_at
+from airground.slam.depth_lookup import MAX_SPREAD, REACH_PX, inverse_depths_at
 
 
 def at(depth: np.ndarray, x: float, y: float, max_depth_m: float = 5.0) -> float:
@@ -16,7 +16,7 @@ def test_a_slanted_surface_gives_its_depth_at_each_pixel() -> None:
     y, x = np.mgrid[:60, :80].astype(np.float32)
     depth = 2.0 + 0.004 * x + 0.002 * y
     rng = np.random.default_rng(0)
-    pixels = rng.uniform((1, 1), (78, 58), (50, 2))
+    pixels = rng.uniform((REACH_PX, REACH_PX), (79 - REACH_PX, 59 - REACH_PX), (50, 2))
     expected = 1.0 / (2.0 + 0.004 * np.rint(pixels[:, 0]) + 0.002 * np.rint(pixels[:, 1]))
     np.testing.assert_allclose(inverse_depths_at(depth, pixels, 5.0), expected, rtol=1e-6)
 
@@ -27,9 +27,9 @@ def test_neither_edges_nor_holes_nor_far_things_are_trusted() -> None:
     depth[30, 20] = np.nan
     depth[:, 60:] = 6.0
     assert at(depth, 10, 10) == 0.5
-    for x, y in [(39, 10), (40, 10), (20, 30), (21, 31), (70, 10)]:
+    for x, y in [(39, 10), (40, 10), (40 - REACH_PX, 10), (20, 30), (21, 31), (70, 10)]:
         assert np.isnan(at(depth, x, y)), (x, y)
-    assert at(depth, 38.4, 10) == 0.5
+    assert at(depth, 39 - REACH_PX, 10) == 0.5
     assert at(depth, 70, 10, max_depth_m=6.0) == pytest.approx(1 / 6)
 
 
