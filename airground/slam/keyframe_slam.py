@@ -26,6 +26,7 @@ from airground.slam.image_turn import ImageTurn
 from airground.slam.inertial.alignment import InertialAlignment
 from airground.slam.keyframe_choice import KeyframeChoice
 from airground.slam.local_mapping import LocalMapper, NewKeyframe
+from airground.slam.loop_closure import LoopCloser
 from airground.slam.map_adjustment import MapAdjuster
 from airground.slam.motion_model import MotionModel, Prediction
 from airground.slam.recovery import Recovery
@@ -102,6 +103,9 @@ class KeyframeSlam:
         self.adjuster = MapAdjuster(self.map, *own, self._inverse_depth_sigma)
         self._mapper = LocalMapper(self.map, self.tracker, self.adjuster, *own, self._max_depth_m)
         self._recovery = Recovery(self.map, *own)
+        self._loops = LoopCloser(
+            self.map, self.tracker, self.adjuster, self._recovery, *own, self._max_depth_m
+        )
         self._choice = KeyframeChoice(self.map, *own)
 
     def add_imu(self, samples: ImuSamples) -> None:
@@ -327,8 +331,12 @@ class KeyframeSlam:
             adjusted = replace(adjusted, velocity=self.state.velocity)
         self.state = adjusted
         self._recovery.add_keyframe()
+        before = adjusted.pose()
+        closed = not self._mapper.found_old and self._loops.close(frame.depth, self.inertial)
+        if closed:
+            self._follow_newest(before)
         if len(self.map.keyframes) < self._next_global:
-            return False
+            return closed
         self._next_global = int(GLOBAL_ADJUSTMENT_GROWTH * self._next_global)
         self.adjust_all()
         return True

@@ -60,6 +60,10 @@ class LocalMapper:
         camera, T_rig_camera: The robot's camera.
         parameters: The robot's section of the configuration.
         max_depth_m: Depth beyond this starts no point.
+
+    Attributes:
+        found_old: Whether the newest keyframe found points again of keyframes older than the
+            window.
     """
 
     def __init__(
@@ -79,6 +83,7 @@ class LocalMapper:
         self._T_rig_camera = T_rig_camera
         self._parameters = parameters
         self._max_depth_m = max_depth_m
+        self.found_old = False
 
     def insert(self, new: NewKeyframe, inertial: bool) -> NDArray[np.float64] | None:
         """Add a keyframe; returns the covariance of its pose where it is known.
@@ -92,7 +97,7 @@ class LocalMapper:
         if new.motion is not None:
             self._adjuster.motions[index] = new.motion
         self._triangulate(keyframe)
-        self._reuse(keyframe, new)
+        self.found_old = self._reuse(keyframe, new)
         covariance = self._adjuster.adjust_window(inertial)
         self._tracker.keep(~self._dropped(self._tracker.ids))
         self._tracker.thin(CROWDED * self._parameters.corner_spacing_px)
@@ -147,11 +152,14 @@ class LocalMapper:
         positions = np.array([k.state.position for k in keyframes])
         return rotations @ T.rotation, rotations @ T.translation + positions
 
-    def _reuse(self, keyframe: Keyframe, new: NewKeyframe) -> None:
-        """Look for points of old keyframes: this is what closes loops before they open."""
+    def _reuse(self, keyframe: Keyframe, new: NewKeyframe) -> bool:
+        """Look for points of old keyframes: this is what closes loops before they open.
+
+        Returns whether there were any.
+        """
         old = len(self._map.keyframes) - 1 - self._parameters.window
         if old <= 0 or self._parameters.reused_keyframes == 0:
-            return
+            return False
         T_map_camera = new.state.pose() @ self._T_rig_camera
         ids = np.setdiff1d(self._map.seen_by(list(range(old))), self._tracker.ids)
         expected, inside = visible(self._map.positions[ids], T_map_camera, self._camera)
@@ -184,15 +192,17 @@ class LocalMapper:
             found_px.append(pixels)
             left = ~np.isin(ids, again)
             ids, expected = ids[left], expected[left]
-        if found_ids:
-            self._take_back(keyframe, new, np.concatenate(found_ids), np.concatenate(found_px))
+        if not found_ids:
+            return False
+        found, pixels = np.concatenate(found_ids), np.concatenate(found_px)
+        return self._take_back(keyframe, new, found, pixels)
 
     def _take_back(
         self, keyframe: Keyframe, new: NewKeyframe, ids: NDArray, pixels: NDArray
-    ) -> None:
+    ) -> bool:
         """Follow old points again if they agree with each other on where the camera is."""
         if len(ids) < MIN_REUSED:
-            return
+            return False
         fit = estimate_pose(
             self._map.positions[ids],
             pixels.astype(np.float64),
@@ -204,10 +214,11 @@ class LocalMapper:
         )
         good = fit.inliers
         if good.sum() < MIN_REUSED or good.mean() < 0.5:
-            return
+            return False
         self._tracker.add(ids[good], pixels[good])
         pixels_kept = pixels[good].astype(np.float64)
         keyframe.see(ids[good], pixels_kept, self._inverse_depths(new, pixels_kept))
+        return True
 
     def _detect(self, keyframe: Keyframe, index: int, new: NewKeyframe) -> None:
         """Follow new corners where there are none; with depth they are in the map at once."""

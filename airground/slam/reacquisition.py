@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -32,7 +34,7 @@ def visible(
 
 def keyframes_in_view(
     sparse_map: SparseMap,
-    candidates: range,
+    candidates: Sequence[int],
     T_map_camera: SE3,
     T_rig_camera: SE3,
     points_in_view: NDArray[np.int64],
@@ -50,7 +52,9 @@ def keyframes_in_view(
         count: At most this many.
         least: Each must have seen at least this many of the points.
     """
-    shared = sparse_map.shared(points_in_view)[: candidates.stop]
+    seen = sparse_map.shared(points_in_view)
+    shared = np.zeros_like(seen)
+    shared[list(candidates)] = seen[list(candidates)]
     axis = T_map_camera.rotation[:, 2]
     chosen: list[int] = []
     for k in np.argsort(-shared, kind="stable"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,7 @@ TURN_SIGMA = 0.02
 """What a gyro leaves open while nothing is seen [rad]."""
 LEVELS = 3
 KEYFRAMES = 3
+NOTHING = np.empty(0, np.int64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +71,12 @@ class Recovery:
         self._index.add(number, keyframe.image, keyframe.ids, keyframe.pixels)
 
     def near(
-        self, image: NDArray[np.uint8], T_map_camera: SE3, turn_known: bool = False
+        self,
+        image: NDArray[np.uint8],
+        T_map_camera: SE3,
+        turn_known: bool = False,
+        among: Sequence[int] | None = None,
+        without: NDArray[np.int64] = NOTHING,
     ) -> Found | None:
         """Look where the map should be if the camera is about there.
 
@@ -77,14 +84,16 @@ class Recovery:
             image: (height, width) grey.
             T_map_camera: About where it was taken.
             turn_known: Whether a gyro says how the camera is turned.
+            among: Keyframes to look for; all by default.
+            without: Numbers of points not to look for.
         """
         least = MIN_FOUND_TURN_KNOWN if turn_known else MIN_FOUND
-        count = len(self._map.keyframes)
-        ids = self._map.seen_by(list(range(count)))
+        candidates = list(range(len(self._map.keyframes)) if among is None else among)
+        ids = np.setdiff1d(self._map.seen_by(candidates), without)
         expected, inside = visible(self._map.positions[ids], T_map_camera, self._camera)
         ids, expected = ids[inside], expected[inside]
         chosen = keyframes_in_view(
-            self._map, range(count), T_map_camera, self._T_rig_camera, ids, KEYFRAMES, least
+            self._map, candidates, T_map_camera, self._T_rig_camera, ids, KEYFRAMES, least
         )
         found_ids: list[NDArray[np.int64]] = []
         found_px: list[NDArray[np.float32]] = []
@@ -107,6 +116,23 @@ class Recovery:
         found = self._index.find(image, self._camera, self._places)
         # Descriptors find the place, patches the pixel.
         return None if found is None else self.near(image, found.fit.T_map_camera)
+
+    def again(self, among: list[int], without: NDArray[np.int64]) -> Found | None:
+        """Look for the places of old keyframes in the newest one.
+
+        Args:
+            among: The old keyframes.
+            without: Numbers of points that do not count.
+        """
+        newest = len(self._map.keyframes) - 1
+        alike = self._index.resembling(newest, among)
+        if not alike:
+            return None
+        image = self._map.keyframes[newest].image
+        found = self._index.find(image, self._camera, self._places, alike)
+        if found is None:
+            return None
+        return self.near(image, found.fit.T_map_camera, among=among, without=without)
 
     def _places(self, ids: NDArray[np.int64]) -> NDArray[np.float64]:
         """(n, 3) positions of points, NaN where they have none."""

@@ -21,6 +21,9 @@ CORNER_SPACING_PX = 12
 VOTERS = 150
 """Corners that choose the keyframes to look at more closely."""
 CANDIDATES = 5
+MIN_ALIKE = 0.06
+"""Another view of the same place has likenesses for a quarter of the corners, an edge of it for
+this share; of other places few have as many."""
 MIN_INLIERS = 20
 MIN_INLIER_SHARE = 0.3
 MIN_HULL_SHARE = 0.05
@@ -107,6 +110,19 @@ class KeyframeIndex:
         starts = np.concatenate([[0], np.cumsum([len(group) for group in groups])])
         counts = votes(query.descriptors[:VOTERS], np.concatenate(groups), starts)
         return [ids[i] for i in np.argsort(-counts, kind="stable")[:CANDIDATES]]
+
+    def resembling(self, keyframe_id: int, among: list[int]) -> list[int]:
+        """Those of some keyframes that may show the place of another one.
+
+        Far cheaper than `find`, since nothing new is described.
+        """
+        if not among:
+            return []
+        corners = self._descriptors[keyframe_id]
+        groups = [self._descriptors[k] for k in among]
+        starts = np.concatenate([[0], np.cumsum([len(group) for group in groups])])
+        counts = votes(corners, np.concatenate(groups), starts)
+        return [k for k, n in zip(among, counts, strict=True) if n >= MIN_ALIKE * len(corners) > 0]
 
     def match(self, query: Described, keyframe_id: int) -> Matches:
         """The keyframe's map points among an image's corners, some of them wrong."""
