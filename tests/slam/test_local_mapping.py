@@ -118,7 +118,8 @@ def test_old_points_come_back_after_another_place() -> None:
     truth, _ = sees(back, mapping.truth[newest.ids[rows]])
     assert np.median(np.linalg.norm(newest.pixels[rows] - truth, axis=1)) < 0.4
     assert len(np.unique(newest.ids)) == len(newest.ids)
-    assert mapping.errors().max() < 0.05
+    # Beside an edge of depth, what is found again may belong to the other side.
+    assert np.percentile(mapping.errors(), 90) < 0.01
 
 
 def test_without_reuse_they_stay_away() -> None:
