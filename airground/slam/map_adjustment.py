@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -110,7 +112,9 @@ class MapAdjuster:
         self, chosen: list[int], roles: NDArray, inertial: bool, settings: Settings
     ) -> NDArray[np.float64] | None:
         moving = [k for k, role in zip(chosen, roles, strict=True) if role != Role.FIXED]
-        points = self._map.seen_by(moving)
+        seen = self._map.seen_by(moving)
+        # Seen once in here, a point would go along with that view and say nothing.
+        points = seen[self._views(chosen)[seen] >= 2]
         observations, rows = self._observations(chosen, points)
         place = {k: n for n, k in enumerate(chosen)}
         factors = [
@@ -129,7 +133,16 @@ class MapAdjuster:
             settings,
         )
         self._apply(chosen, points, rows, result)
+        everywhere = self._views(range(len(self._map.keyframes)))
+        self._map.drop(seen[everywhere[seen] < 2])
         return result.covariance
+
+    def _views(self, keyframes: Iterable[int]) -> NDArray[np.int64]:
+        """(P,) how many of the keyframes saw each point."""
+        views = np.zeros(len(self._map), np.int64)
+        for k in keyframes:
+            views[self._map.keyframes[k].ids] += 1
+        return views
 
     def _states(self, chosen: list[int]) -> States:
         states = [self._map.keyframes[k].state for k in chosen]
@@ -182,12 +195,9 @@ class MapAdjuster:
         limit = MAX_RESIDUAL_SIGMAS * self._parameters.corner_sigma_px
         # Written so that NaN, a point behind the camera, counts as wrong.
         wrong = ~(result.residuals_px < limit)
-        left = np.zeros(len(self._map), np.int64)
         bounds = np.cumsum([0] + [len(r) for r in rows])
         for n, k in enumerate(chosen):
             keyframe = self._map.keyframes[k]
             bad = np.zeros(len(keyframe.ids), bool)
             bad[rows[n]] = wrong[bounds[n] : bounds[n + 1]]
             keyframe.forget(bad)
-            left[keyframe.ids] += 1
-        self._map.drop(points[left[points] < 2])

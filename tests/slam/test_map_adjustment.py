@@ -178,6 +178,27 @@ def test_bad_observations_go_and_points_with_too_few_left_leave_the_map() -> Non
     assert sparse_map.mapped(clean).all()
 
 
+def test_a_point_that_only_others_saw_often_stays_as_it_is() -> None:
+    """One new sight of an old point says nothing yet, but the point is as good as before."""
+    problem = bundle_problems.make(10, 400, 120)
+    sparse_map = map_of(problem)
+    views = np.bincount(np.concatenate([k.ids for k in sparse_map.keyframes]), minlength=400)
+    early = np.bincount(np.concatenate([k.ids for k in sparse_map.keyframes[:2]]), minlength=400)
+    newest = sparse_map.keyframes[9]
+    old = np.setdiff1d(np.flatnonzero((early == 2) & (views <= 4)), newest.ids)[:8]
+    assert len(old) > 3
+    for keyframe in sparse_map.keyframes[2:]:
+        keyframe.forget(np.isin(keyframe.ids, old))
+    pose = newest.state.pose() @ T_RIG_CAMERA
+    there = CAMERA.project(pose.inverse() @ sparse_map.positions[old])
+    newest.see(old, there, np.full(len(old), np.nan))
+    before = sparse_map.positions[old].copy()
+    adjuster_of(sparse_map, problem).adjust_window(False)  # neither 0 nor 1 holds the window
+    assert sparse_map.mapped(old).all()
+    np.testing.assert_array_equal(sparse_map.positions[old], before)
+    assert np.isin(old, newest.ids).all()
+
+
 def test_motion_across_a_missing_keyframe_does_not_count() -> None:
     """Factors join neighbours only: `motions` of a keyframe whose predecessor holds not."""
     problem = bundle_problems.make(8, 300, 100)
