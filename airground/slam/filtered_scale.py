@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from airground.slam.front_end import ScaleEstimate
 from airground.slam.inertial.alignment import VisualNoise
 from airground.slam.inertial.scale_filter import ScaleFilter
 from airground.slam.inertial.stationarity import gravity_aligned
 from airground.slam.keyframe_slam import KeyframeSlam
-from airground.slam.tight_scale import pose_sigma
+from airground.slam.tight_scale import UNKNOWN_TILT, pose_sigma
 
 SETTLING_S = 5.0
 """The filter is not asked before it has seen this much motion [s]."""
+FILTER_TILT = np.deg2rad(1.0)
+"""What the filter leaves open in the vertical, in simulation [rad]."""
 GIVE_OUT_SIGMA = 0.03
 """Poses are given out when the scale is known this well [share]; more takes half a minute."""
 
@@ -27,11 +31,13 @@ class FilteredScale:
     Attributes:
         estimate: How well the scale is known; None before there was anything to judge by.
         known: Whether poses may be given out.
+        tilt_sigma: How well the vertical is known, per axis [rad].
     """
 
     def __init__(self, slam: KeyframeSlam) -> None:
         self.estimate: ScaleEstimate | None = None
         self.known = slam.calibration.imu is None
+        self.tilt_sigma = UNKNOWN_TILT
         self._slam = slam
         self._filter: ScaleFilter | None = None
         self._first_ns = self._last_ns = 0
@@ -61,5 +67,5 @@ class FilteredScale:
             return False
         right = slam.map.keyframes[0].state.rotation @ slam.T_rig_camera.rotation[:, 0]
         slam.make_upright(self._filter.scale, gravity_aligned(-gravity, right))
-        self.known = True
+        self.known, self.tilt_sigma = True, FILTER_TILT
         return True

@@ -29,6 +29,7 @@ from airground.slam.local_mapping import LocalMapper, NewKeyframe
 from airground.slam.loop_closure import LoopCloser
 from airground.slam.map_adjustment import MapAdjuster
 from airground.slam.motion_model import MotionModel, Prediction
+from airground.slam.pose_covariance import with_shared_errors
 from airground.slam.recovery import Recovery
 from airground.slam.rig_state import RigState
 from airground.slam.sparse_map import SparseMap
@@ -218,9 +219,13 @@ class KeyframeSlam:
         self.inertial = True
         self.adjust_all()
 
-    def covariance(self, fit: PoseFit) -> NDArray[np.float64]:
+    def covariance(
+        self, fit: PoseFit, scale_sigma: float, tilt_sigma: float
+    ) -> NDArray[np.float64]:
         """(6, 6) of the newest pose: that of the image within the map, and of the map."""
-        return fit.covariance + self._keyframe_covariance
+        within = fit.covariance + self._keyframe_covariance
+        lever = fit.T_map_camera.translation - self.map.keyframes[0].state.position
+        return with_shared_errors(within, lever, scale_sigma, tilt_sigma)
 
     def unseen_s(self) -> float:
         """How long ago an image gave a pose [s]."""

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airground.config import Config
 from airground.core.messages import ImuSamples, MavImage, RobotCalibration
 from airground.core.trajectory import Trajectory
 from airground.slam.filtered_scale import FilteredScale
-from airground.slam.frame import Frame
-from airground.slam.front_end import TrackedPose, Tracking
+from airground.slam.frame import Frame, require_order
+from airground.slam.front_end import ScaleEstimate, TrackedPose, Tracking
+from airground.slam.geometry.pose_estimation import PoseFit
 from airground.slam.keyframe_slam import KeyframeSlam
 from airground.slam.starts import RestStart, TwoViewWait
 from airground.slam.tight_scale import TightScale
 
 MIN_TRACKED = 30
 """Map points that must be seen before the first pose is given out."""
+UNKNOWN_SCALE = ScaleEstimate(np.inf, observable=False)
+"""While there is no motion to judge by."""
 MAX_UNSEEN_S = 3.5
 """A map that was begun but shows too few points for so long is begun anew."""
 
@@ -43,6 +47,7 @@ class MonocularSlam:
         self._rest = RestStart(calibration)
         self._two_views = TwoViewWait(calibration, config.monocular_slam, start_rng)
         self._given_out = False
+        self._last_ns: int | None = None
 
     def add_imu(self, samples: ImuSamples) -> None:
         """Take the inertial measurements up to the next image."""
@@ -50,6 +55,8 @@ class MonocularSlam:
 
     def track(self, image: MavImage) -> TrackedPose:
         """Where the camera was when `image` was taken."""
+        require_order(image.stamp_ns, self._last_ns)
+        self._last_ns = image.stamp_ns
         frame = Frame(image.stamp_ns, image.image)
         slam = self._slam
         if not slam.begun:
@@ -70,7 +77,7 @@ class MonocularSlam:
             image.stamp_ns,
             Tracking.TRACKED,
             slam.T_map_camera(),
-            slam.covariance(fit),
+            self._covariance(fit),
             self._scale.estimate,
             slam.depth_range(),
             corrected,
@@ -106,5 +113,11 @@ class MonocularSlam:
     def _unknown_scale(self) -> TightScale | FilteredScale:
         return TightScale(self._slam) if self._tight else FilteredScale(self._slam)
 
+    def _covariance(self, fit: PoseFit) -> NDArray[np.float64]:
+        scale = self._scale.estimate
+        scale_sigma = min(scale.sigma, 1.0) if scale is not None else 1.0
+        return self._slam.covariance(fit, scale_sigma, self._scale.tilt_sigma)
+
     def _initializing(self, frame: Frame) -> TrackedPose:
-        return TrackedPose(frame.stamp_ns, Tracking.INITIALIZING, None, scale=self._scale.estimate)
+        scale = self._scale.estimate or UNKNOWN_SCALE
+        return TrackedPose(frame.stamp_ns, Tracking.INITIALIZING, None, scale=scale)

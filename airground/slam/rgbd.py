@@ -8,9 +8,10 @@ import numpy as np
 from airground.config import Config
 from airground.core.messages import GroundImage, ImuSamples, RobotCalibration
 from airground.core.trajectory import Trajectory
-from airground.slam.frame import Frame
+from airground.slam.frame import Frame, require_order
 from airground.slam.front_end import TrackedPose, Tracking
 from airground.slam.keyframe_slam import KeyframeSlam
+from airground.slam.pose_covariance import DEPTH_SCALE_SIGMA, LEVEL_SIGMA
 from airground.slam.starts import level_start
 
 MIN_FIRST_POINTS = 40
@@ -37,6 +38,7 @@ class RgbdSlam:
             calibration, parameters, rng, parameters.depth_noise_per_m, parameters.max_depth_m
         )
         self._slam.metric = True
+        self._last_ns: int | None = None
 
     def add_imu(self, samples: ImuSamples) -> None:
         """Take the inertial measurements up to the next image."""
@@ -44,6 +46,8 @@ class RgbdSlam:
 
     def track(self, image: GroundImage) -> TrackedPose:
         """Where the camera was when `image` was taken."""
+        require_order(image.stamp_ns, self._last_ns)
+        self._last_ns = image.stamp_ns
         grey = cv2.cvtColor(image.colour, cv2.COLOR_RGB2GRAY).astype(np.uint8, copy=False)
         frame = Frame(image.stamp_ns, grey, image.depth)
         slam = self._slam
@@ -57,7 +61,7 @@ class RgbdSlam:
             image.stamp_ns,
             Tracking.TRACKED,
             slam.T_map_camera(),
-            covariance=slam.covariance(fit),
+            covariance=slam.covariance(fit, DEPTH_SCALE_SIGMA, LEVEL_SIGMA),
             depth_range=slam.depth_range(),
             corrected=corrected,
         )

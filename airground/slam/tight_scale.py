@@ -17,7 +17,12 @@ MAX_KEYFRAMES = 60
 GIVE_OUT_SIGMA = 0.02
 """Poses are given out when the scale is known this well [share] ..."""
 GIVE_OUT_TILT = np.deg2rad(0.5)
-"""... and the vertical this well [rad]."""
+"""... and the vertical this well [rad] ..."""
+TILT_PATIENCE_S, PATIENT_TILT = 6.0, np.deg2rad(0.7)
+"""... or after so long [s] this well: flying without turning, nobody can tell tilt from the bias
+of an accelerometer."""
+UNKNOWN_TILT = np.deg2rad(5.0)
+"""What one look at the accelerometer tells of the vertical [rad]."""
 POSE_SIGMA_PX = 0.3
 """Noise of a keyframe's place, as its points would see it [px]."""
 
@@ -34,12 +39,14 @@ class TightScale:
     Attributes:
         estimate: How well the scale is known; None before there was anything to judge by.
         known: Whether poses may be given out.
+        tilt_sigma: How well the vertical is known, per axis [rad].
     """
 
     def __init__(self, slam: KeyframeSlam) -> None:
         self.estimate: ScaleEstimate | None = None
         # Without an IMU nobody will ever know: the unit is the scene's median depth.
         self.known = slam.calibration.imu is None
+        self.tilt_sigma = UNKNOWN_TILT
         self._slam = slam
         self._judged = 0
 
@@ -64,7 +71,9 @@ class TightScale:
         if alignment is None:
             return False
         self.estimate = ScaleEstimate(alignment.scale_sigma, alignment.observable)
-        ready = alignment.scale_sigma < GIVE_OUT_SIGMA and alignment.tilt_sigma < GIVE_OUT_TILT
+        self.tilt_sigma = min(alignment.tilt_sigma, UNKNOWN_TILT)
+        tilt = PATIENT_TILT if seconds > TILT_PATIENCE_S else GIVE_OUT_TILT
+        ready = alignment.scale_sigma < GIVE_OUT_SIGMA and alignment.tilt_sigma < tilt
         self.known = self.known or ready
         if slam.inertial or not ready:
             return False
