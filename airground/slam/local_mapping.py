@@ -161,7 +161,7 @@ class LocalMapper:
         if old <= 0 or self._parameters.reused_keyframes == 0:
             return False
         T_map_camera = new.state.pose() @ self._T_rig_camera
-        ids = np.setdiff1d(self._map.seen_by(list(range(old))), self._tracker.ids)
+        ids = np.setdiff1d(self._map.begun_before(old), self._tracker.ids, assume_unique=True)
         expected, inside = visible(self._map.positions[ids], T_map_camera, self._camera)
         ids, expected = ids[inside], expected[inside]
         chosen = keyframes_in_view(

@@ -111,6 +111,11 @@ class SparseMap:
         ids = np.unique(np.concatenate([self.keyframes[k].ids for k in keyframes]))
         return ids[self.mapped(ids)]
 
+    def begun_before(self, keyframe: int) -> NDArray[np.int64]:
+        """Numbers of all points in the map that were first seen earlier than a keyframe."""
+        n = self._count
+        return np.flatnonzero((self.states[:n] == MAPPED) & (self.origins[:n] < keyframe))
+
     def shared(self, ids: NDArray[np.int64]) -> NDArray[np.int64]:
         """(K,) how many of the points each keyframe saw."""
         wanted = np.zeros(len(self.states), bool)
