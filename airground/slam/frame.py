@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from airground.errors import InputError
+
 
 @dataclass(frozen=True, eq=False)
 class Frame:
@@ -21,3 +23,15 @@ class Frame:
     stamp_ns: int
     image: NDArray[np.uint8]
     depth: NDArray[np.float32] | None = None
+
+
+def require_order(stamp_ns: int, last_ns: int | None) -> None:
+    """Refuse an image that is not newer than the one before; None where there is none.
+
+    Raises:
+        InputError: It is not.
+    """
+    if last_ns is not None and stamp_ns <= last_ns:
+        raise InputError(
+            f"image at {stamp_ns} ns comes after one at {last_ns} ns: stamps must increase"
+        )

@@ -14,6 +14,10 @@ from airground.slam.feature_tracker import FeatureTracker
 from airground.slam.rig_state import RigState
 from airground.slam.sparse_map import Keyframe, SparseMap
 
+SCARCE_POINTS, HASTE = 40, 0.4
+"""With fewer map points than this in an image, a keyframe is made after this share of the usual
+way: there is little left to track by, and new points need a second view."""
+
 
 @dataclass(frozen=True)
 class News:
@@ -66,10 +70,12 @@ class KeyframeChoice:
         last_view = last.state.rotation @ self._R_rig_camera
         turn = last_view.T @ state.rotation @ self._R_rig_camera
         news = what_is_new(self._map, last, tracker, turn, self._camera)
+        scarce = self._map.mapped(tracker.ids).sum() < SCARCE_POINTS
+        parallax_px = (HASTE if scarce else 1.0) * parameters.keyframe_parallax_px
         return (
             news.share_left < parameters.keyframe_share
             or news.mapped_left < parameters.keyframe_share
-            or news.parallax_px > parameters.keyframe_parallax_px
+            or news.parallax_px > parallax_px
         )
 
 
