@@ -17,8 +17,8 @@ ROTATION_SIGMA, POSITION_SIGMA_M = 2e-3, 5e-3
 """What one shared point leaves open between two keyframes: a pixel, at 2 m [rad], [m]."""
 MIN_SHARED = 15
 """Keyframes that share fewer points say little about each other ..."""
-LEAST_POINTS = 3
-"""... but neighbours in time never come apart: motion between them counts as so many."""
+LEAST_POINTS = 1
+"""... but neighbours in time never come apart: motion between them counts as one."""
 LOOP_CERTAINTY = 10.0
 """The chain of keyframes drifted and the loop's own measurement did not: its sigmas are so many
 times smaller than those of an edge with as many points."""
