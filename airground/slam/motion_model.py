@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.messages import ImuNoise, ImuSamples
+from airground.core.se3 import nearest_rotation
 from airground.slam.inertial.preintegration import ImuBuffer, Preintegration
 from airground.slam.rig_state import RigState
 
@@ -114,5 +115,8 @@ class MotionModel:
             return replace(before, rotation=turned.rotation, velocity=np.zeros(3))
         if prediction.inertial:
             return state
+        # The last turn repeats itself, and without this so would its rounding, doubled each time.
+        rotation = nearest_rotation(state.rotation)
         # What drives along a curve turns its velocity with it.
-        return replace(state, velocity=state.rotation @ before.rotation.T @ before.velocity)
+        velocity = rotation @ before.rotation.T @ before.velocity
+        return replace(state, rotation=rotation, velocity=velocity)

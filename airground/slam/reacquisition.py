@@ -40,6 +40,7 @@ def keyframes_in_view(
     points_in_view: NDArray[np.int64],
     count: int,
     least: int,
+    max_turn_deg: float = MAX_TURN_DEG,
 ) -> list[int]:
     """The keyframes with a similar view that saw most of the points.
 
@@ -51,6 +52,7 @@ def keyframes_in_view(
         points_in_view: Numbers of the points that the view should see.
         count: At most this many.
         least: Each must have seen at least this many of the points.
+        max_turn_deg: Views that are turned by more are not similar.
     """
     seen = sparse_map.shared(points_in_view)
     shared = np.zeros_like(seen)
@@ -68,7 +70,7 @@ def keyframes_in_view(
         here = float(axis @ (centre - T_map_camera.translation))
         there = float(R_map_camera[:, 2] @ (centre - keyframe.state.position))
         zoom = max(here, there) / max(min(here, there), 1e-6)
-        if np.rad2deg(turn) < MAX_TURN_DEG and zoom < MAX_ZOOM:
+        if np.rad2deg(turn) < max_turn_deg and zoom < MAX_ZOOM:
             chosen.append(int(k))
     return chosen
 

@@ -24,6 +24,8 @@ TURN_SIGMA = 0.02
 """What a gyro leaves open while nothing is seen [rad]."""
 LEVELS = 3
 KEYFRAMES = 3
+MAX_TURN_DEG = 40.0
+"""Where no view is more similar, one turned so far still shows some points alike."""
 NOTHING = np.empty(0, np.int64)
 
 
@@ -92,9 +94,8 @@ class Recovery:
         ids = np.setdiff1d(self._map.seen_by(candidates), without)
         expected, inside = visible(self._map.positions[ids], T_map_camera, self._camera)
         ids, expected = ids[inside], expected[inside]
-        chosen = keyframes_in_view(
-            self._map, candidates, T_map_camera, self._T_rig_camera, ids, KEYFRAMES, least
-        )
+        seen = (self._map, candidates, T_map_camera, self._T_rig_camera, ids, KEYFRAMES, least)
+        chosen = keyframes_in_view(*seen) or keyframes_in_view(*seen, MAX_TURN_DEG)
         found_ids: list[NDArray[np.int64]] = []
         found_px: list[NDArray[np.float32]] = []
         for k in chosen:
