@@ -50,6 +50,9 @@ R_BODY_DOWN = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 R_BODY_AHEAD = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """Camera looking straight ahead."""
 PITCH_DEG = 20.0
+R_PITCH = Rotation.from_euler("y", PITCH_DEG, degrees=True).as_matrix()
+T_MAV_IMU_CAMERA = SE3(R_BODY_DOWN, np.array([0.05, 0.01, -0.03]))
+T_GROUND_IMU_CAMERA = SE3(R_PITCH @ R_BODY_AHEAD, np.array([0.08, 0.02, 0.05]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +98,6 @@ class Sequence:
 @cache
 def mav_sequence(frames: int = 40, rate_hz: float = 30.0, speed_mps: float = 0.5) -> Sequence:
     """The MAV, 2 m over the boxes, swaying a little."""
-    T_imu_camera = SE3(R_BODY_DOWN, np.array([0.05, 0.01, -0.03]))
 
     def path(t: NDArray, angle: NDArray, awake: NDArray) -> NDArray:
         x, y = RADIUS_M * np.cos(angle), RADIUS_M * np.sin(angle)
@@ -105,14 +107,12 @@ def mav_sequence(frames: int = 40, rate_hz: float = 30.0, speed_mps: float = 0.5
         yaw = awake * 0.2 * np.sin(2 * np.pi * 0.2 * t)
         return np.column_stack([x, y, z, roll, pitch, yaw])
 
-    return _sequence(Source.MAV, T_imu_camera, path, frames, rate_hz, speed_mps)
+    return _sequence(Source.MAV, T_MAV_IMU_CAMERA, path, frames, rate_hz, speed_mps)
 
 
 @cache
 def ground_sequence(frames: int = 40, rate_hz: float = 30.0, speed_mps: float = 0.4) -> Sequence:
     """The ground robot, driving a circle around the boxes with colour and depth."""
-    R_pitch = Rotation.from_euler("y", PITCH_DEG, degrees=True).as_matrix()
-    T_imu_camera = SE3(R_pitch @ R_BODY_AHEAD, np.array([0.08, 0.02, 0.05]))
 
     def path(t: NDArray, angle: NDArray, awake: NDArray) -> NDArray:
         x, y = RADIUS_M * np.cos(angle), RADIUS_M * np.sin(angle)
@@ -121,7 +121,7 @@ def ground_sequence(frames: int = 40, rate_hz: float = 30.0, speed_mps: float = 
         pitch = awake * 0.006 * np.sin(2 * np.pi * 2.5 * t + 1)
         return np.column_stack([x, y, z, roll, pitch, angle + np.pi / 2])
 
-    return _sequence(Source.GROUND, T_imu_camera, path, frames, rate_hz, speed_mps)
+    return _sequence(Source.GROUND, T_GROUND_IMU_CAMERA, path, frames, rate_hz, speed_mps)
 
 
 def _sequence(
@@ -132,9 +132,31 @@ def _sequence(
     rate_hz: float,
     speed_mps: float,
 ) -> Sequence:
+    return along(
+        robot, T_imu_camera, _spline(path, speed_mps, frames / rate_hz + 0.5), frames, rate_hz
+    )
+
+
+def along(
+    robot: Source,
+    T_imu_camera: SE3,
+    spline: BSpline,
+    frames: int,
+    rate_hz: float,
+    imu_noise: float = 0.0,
+) -> Sequence:
+    """What a robot senses on its way.
+
+    Args:
+        robot: Who; its images are of that kind.
+        T_imu_camera: The camera in the IMU.
+        spline: x, y, z [m], roll, pitch, yaw [rad] of the IMU over time since the first image
+            [s], from half a second before it to half a second after the last.
+        frames, rate_hz: Of the camera [-], [Hz].
+        imu_noise: Of the inertial samples, as a share of `IMU_NOISE`.
+    """
     stamps = START_NS + np.rint(np.arange(frames) * 1e9 / rate_hz).astype(np.int64)
-    end_s = (int(stamps[-1]) - START_NS) / 1e9 + 0.5
-    spline = _spline(path, speed_mps, end_s)
+    end_s = (int(stamps[-1]) - START_NS) / 1e9 + 0.4
     poses = [_T_world_imu(spline, stamp) @ T_imu_camera for stamp in stamps]
     rng = np.random.default_rng(int(robot))
     images = tuple(
@@ -144,6 +166,16 @@ def _sequence(
         CAMERA, T_imu_camera, SE3(np.eye(3), np.array([0.0, 0.0, 0.1])), IMU_NOISE
     )
     imu = _imu(spline, end_s)
+    sigmas = (
+        imu_noise
+        * np.sqrt(IMU_HZ)
+        * np.array([IMU_NOISE.gyro_noise_density, IMU_NOISE.accelerometer_noise_density])
+    )
+    imu = replace(
+        imu,
+        gyro=imu.gyro + rng.normal(0, sigmas[0], imu.gyro.shape),
+        accelerometer=imu.accelerometer + rng.normal(0, sigmas[1], imu.gyro.shape),
+    )
     return Sequence(robot, calibration, images, imu, Trajectory.from_poses(stamps.tolist(), poses))
 
 
