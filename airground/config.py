@@ -63,11 +63,9 @@ class RgbdSlam(KeyframeSlam):
     """The ground robot's SLAM: colour and depth."""
 
     keyframe_parallax_px: Positive = 40.0
-    corner_sigma_px: Positive = 1.5
-    """Twice the MAV's: colour cameras of depth sensors roll their shutters [px]."""
     depth_noise_per_m: Positive = 0.003
     """Standard deviation of inverse depth as measured [1/m]."""
-    max_depth_m: Positive = 3.5
+    max_depth_m: Positive = 5.0
     """Depth beyond this does not start a point [m]."""
 
 

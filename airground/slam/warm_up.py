@@ -1,0 +1,82 @@
+"""Compiles what SLAM needs before the first image is waiting for it."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.config import Config
+from airground.core.camera import PinholeCamera
+from airground.core.messages import (
+    GroundImage,
+    ImuNoise,
+    ImuSamples,
+    MavImage,
+    RobotCalibration,
+)
+from airground.core.se3 import SE3
+from airground.slam.inertial.preintegration import GRAVITY
+from airground.slam.monocular import MonocularSlam
+from airground.slam.rgbd import RgbdSlam
+
+CAMERA = PinholeCamera(320, 240, 200.0, 200.0, 159.5, 119.5)
+DOWN = SE3(np.diag([1.0, -1.0, -1.0]), np.zeros(3))
+HEIGHT_M = 1.0
+REST_S, SWING_S, SWING_M = 0.8, 2.4, 0.25
+IMAGE_NS, IMU_NS = 50_000_000, 5_000_000
+IMAGES = 90
+DARK = 70
+"""One black image, so that finding the way back is compiled, too."""
+
+
+def warm_up_slam() -> None:
+    """Track a camera that swings over a flat texture, as both robots would."""
+    texture = _texture()
+    noise = ImuNoise(1e-4, 1e-5, 1e-3, 1e-4)
+    calibration = RobotCalibration(CAMERA, DOWN, SE3.identity(), noise)
+    depth = np.full((CAMERA.height, CAMERA.width), HEIGHT_M, np.float32)
+    mav = MonocularSlam(calibration, Config(), np.random.default_rng(0))
+    ground = RgbdSlam(calibration, Config(), np.random.default_rng(0))
+    for index in range(1, IMAGES):
+        stamp_ns = index * IMAGE_NS
+        samples = _samples(stamp_ns)
+        grey = _image(texture, stamp_ns * 1e-9) if index != DARK else np.zeros_like(depth, np.uint8)
+        mav.add_imu(samples)
+        mav.track(MavImage(stamp_ns, grey))
+        if index % 3 == 0 or index == DARK:
+            colour = np.repeat(grey[..., None], 3, axis=2)
+            ground.track(GroundImage(stamp_ns, colour, depth))
+    mav.finish()
+    ground.finish()
+
+
+def _texture() -> NDArray[np.uint8]:
+    noise = np.random.default_rng(1).uniform(0, 255, (480, 640)).astype(np.float32)
+    smooth = cv2.GaussianBlur(noise, (0, 0), 2.0)
+    return ((smooth - smooth.min()) * (255 / np.ptp(smooth))).astype(np.uint8)
+
+
+def _place(t: float) -> float:
+    """Where along x the camera is after t seconds [m]."""
+    swing = 2 * np.pi / SWING_S
+    return SWING_M * (1 - np.cos(swing * (t - REST_S))) if t > REST_S else 0.0
+
+
+def _image(texture: NDArray[np.uint8], t: float) -> NDArray[np.uint8]:
+    slid_px = 20.0 + _place(t) * CAMERA.fx / HEIGHT_M
+    shift = np.array([[1.0, 0.0, -slid_px], [0.0, 1.0, -120.0]])
+    size = CAMERA.width, CAMERA.height
+    return cv2.warpAffine(texture, shift, size, flags=cv2.INTER_LINEAR).astype(np.uint8)
+
+
+def _samples(stamp_ns: int) -> ImuSamples:
+    """What the IMU read since the image before."""
+    stamps = np.arange(stamp_ns - IMAGE_NS + IMU_NS, stamp_ns + 1, IMU_NS)
+    t = stamps * 1e-9
+    swing = 2 * np.pi / SWING_S
+    moving = t > REST_S
+    force = np.zeros((len(t), 3))
+    force[:, 0] = np.where(moving, SWING_M * swing**2 * np.cos(swing * (t - REST_S)), 0.0)
+    force[:, 2] = GRAVITY
+    return ImuSamples(stamps, np.zeros((len(t), 3)), force)
