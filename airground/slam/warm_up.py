@@ -26,28 +26,31 @@ HEIGHT_M = 1.0
 REST_S, SWING_S, SWING_M = 0.8, 2.4, 0.25
 IMAGE_NS, IMU_NS = 50_000_000, 5_000_000
 IMAGES = 90
-DARK = 70
-"""One black image, so that finding the way back is compiled, too."""
+MOVING = 24
+DARK = range(70, 73)
+"""Black images, so that finding the way back is compiled, too."""
 
 
 def warm_up_slam() -> None:
-    """Track a camera that swings over a flat texture, as both robots would."""
+    """Track a camera that swings over a flat texture, as both robots would.
+
+    The MAV begins once at rest and once in motion.
+    """
     texture = _texture()
     noise = ImuNoise(1e-4, 1e-5, 1e-3, 1e-4)
     calibration = RobotCalibration(CAMERA, DOWN, SE3.identity(), noise)
-    depth = np.full((CAMERA.height, CAMERA.width), HEIGHT_M, np.float32)
-    mav = MonocularSlam(calibration, Config(), np.random.default_rng(0))
+    for first in (1, MOVING):
+        mav = MonocularSlam(calibration, Config(), np.random.default_rng(0))
+        for index in range(first, IMAGES):
+            mav.add_imu(_samples(index * IMAGE_NS))
+            mav.track(MavImage(index * IMAGE_NS, _image(texture, index)))
+        mav.finish()
     ground = RgbdSlam(calibration, Config(), np.random.default_rng(0))
+    depth = np.full((CAMERA.height, CAMERA.width), HEIGHT_M, np.float32)
     for index in range(1, IMAGES):
-        stamp_ns = index * IMAGE_NS
-        samples = _samples(stamp_ns)
-        grey = _image(texture, stamp_ns * 1e-9) if index != DARK else np.zeros_like(depth, np.uint8)
-        mav.add_imu(samples)
-        mav.track(MavImage(stamp_ns, grey))
-        if index % 3 == 0 or index == DARK:
-            colour = np.repeat(grey[..., None], 3, axis=2)
-            ground.track(GroundImage(stamp_ns, colour, depth))
-    mav.finish()
+        colour = np.repeat(_image(texture, index)[..., None], 3, axis=2)
+        ground.add_imu(_samples(index * IMAGE_NS))
+        ground.track(GroundImage(index * IMAGE_NS, colour, depth))
     ground.finish()
 
 
@@ -63,8 +66,10 @@ def _place(t: float) -> float:
     return SWING_M * (1 - np.cos(swing * (t - REST_S))) if t > REST_S else 0.0
 
 
-def _image(texture: NDArray[np.uint8], t: float) -> NDArray[np.uint8]:
-    slid_px = 20.0 + _place(t) * CAMERA.fx / HEIGHT_M
+def _image(texture: NDArray[np.uint8], index: int) -> NDArray[np.uint8]:
+    if index in DARK:
+        return np.zeros((CAMERA.height, CAMERA.width), np.uint8)
+    slid_px = 20.0 + _place(index * IMAGE_NS * 1e-9) * CAMERA.fx / HEIGHT_M
     shift = np.array([[1.0, 0.0, -slid_px], [0.0, 1.0, -120.0]])
     size = CAMERA.width, CAMERA.height
     return cv2.warpAffine(texture, shift, size, flags=cv2.INTER_LINEAR).astype(np.uint8)
