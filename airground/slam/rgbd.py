@@ -14,6 +14,9 @@ from airground.slam.keyframe_slam import KeyframeSlam
 from airground.slam.pose_covariance import DEPTH_SCALE_SIGMA, LEVEL_SIGMA
 from airground.slam.starts import level_start
 
+HAND_HELD = 1.5
+"""A depth camera without an IMU is in somebody's hand: it turns while its rows are read one after
+the other, and corners are this many times less certain."""
 MIN_FIRST_POINTS = 40
 """A map begins with an image that shows at least this many corners with depth."""
 
@@ -34,6 +37,9 @@ class RgbdSlam:
         self, calibration: RobotCalibration, config: Config, rng: np.random.Generator
     ) -> None:
         parameters = config.rgbd_slam
+        if calibration.imu is None:
+            sigma_px = HAND_HELD * parameters.corner_sigma_px
+            parameters = parameters.model_copy(update={"corner_sigma_px": sigma_px})
         self._slam = KeyframeSlam(
             calibration, parameters, rng, parameters.depth_noise_per_m, parameters.max_depth_m
         )
