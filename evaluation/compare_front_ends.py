@@ -68,6 +68,7 @@ def _known(
 
 
 def main(words: Sequence[str] | None = None) -> None:
+    """Draw what the words ask for, and print a line for each front end."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("recording", type=Path)
     parser.add_argument("robot", choices=["mav", "ground"])

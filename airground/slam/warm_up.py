@@ -31,21 +31,24 @@ DARK = range(70, 73)
 """Black images, so that finding the way back is compiled, too."""
 
 
-def warm_up_slam() -> None:
+def warm_up_slam(rng: np.random.Generator) -> None:
     """Track a camera that swings over a flat texture, as both robots would.
 
     The MAV begins once at rest and once in motion.
+
+    Args:
+        rng: Draws the texture and the samples.
     """
-    texture = _texture()
+    texture = _texture(rng)
     noise = ImuNoise(1e-4, 1e-5, 1e-3, 1e-4)
     calibration = RobotCalibration(CAMERA, DOWN, SE3.identity(), noise)
     for first in (1, MOVING):
-        mav = MonocularSlam(calibration, Config(), np.random.default_rng(0))
+        mav = MonocularSlam(calibration, Config(), rng)
         for index in range(first, IMAGES):
             mav.add_imu(_samples(index * IMAGE_NS))
             mav.track(MavImage(index * IMAGE_NS, _image(texture, index)))
         mav.finish()
-    ground = RgbdSlam(calibration, Config(), np.random.default_rng(0))
+    ground = RgbdSlam(calibration, Config(), rng)
     depth = np.full((CAMERA.height, CAMERA.width), HEIGHT_M, np.float32)
     for index in range(1, IMAGES):
         colour = np.repeat(_image(texture, index)[..., None], 3, axis=2)
@@ -54,8 +57,8 @@ def warm_up_slam() -> None:
     ground.finish()
 
 
-def _texture() -> NDArray[np.uint8]:
-    noise = np.random.default_rng(1).uniform(0, 255, (480, 640)).astype(np.float32)
+def _texture(rng: np.random.Generator) -> NDArray[np.uint8]:
+    noise = rng.uniform(0, 255, (480, 640)).astype(np.float32)
     smooth = cv2.GaussianBlur(noise, (0, 0), 2.0)
     return ((smooth - smooth.min()) * (255 / np.ptp(smooth))).astype(np.uint8)
 

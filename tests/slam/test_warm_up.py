@@ -27,7 +27,7 @@ def compiled() -> dict[str, int]:
 
 
 def test_tracking_compiles_nothing_after_the_warm_up() -> None:
-    warm_up_slam()
+    warm_up_slam(np.random.default_rng(0))
     before = compiled()
     assert sum(before.values()) > 20
     ground = ground_sequence().darkened(30, 33)
