@@ -148,7 +148,12 @@ class TestRun:
         )
 
     @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
-    def test_interrupts_unwind(self, sent: int, capsys: pytest.CaptureFixture[str]) -> None:
+    def test_interrupts_unwind(
+        self, sent: int, capsys: pytest.CaptureFixture[str], request: pytest.FixtureRequest
+    ) -> None:
+        # A shell that runs the tests in the background has them ignore interrupts.
+        inherited = signal.signal(signal.SIGINT, signal.default_int_handler)
+        request.addfinalizer(lambda: signal.signal(signal.SIGINT, inherited))
         cleaned = []
 
         def be_interrupted() -> None:
