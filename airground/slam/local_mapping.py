@@ -17,7 +17,7 @@ from airground.slam.geometry.pose_estimation import estimate_pose
 from airground.slam.geometry.triangulation import triangulate_pairs
 from airground.slam.inertial.preintegration import Preintegration
 from airground.slam.map_adjustment import MapAdjuster
-from airground.slam.reacquisition import find_again, keyframes_in_view, visible
+from airground.slam.reacquisition import find_in_keyframes, keyframes_in_view, visible
 from airground.slam.rig_state import RigState
 from airground.slam.sparse_map import CANDIDATE, Keyframe, SparseMap
 
@@ -173,28 +173,16 @@ class LocalMapper:
             self._parameters.reused_keyframes,
             MIN_REUSED,
         )
-        found_ids: list[NDArray] = []
-        found_px: list[NDArray] = []
-        for k in chosen:
-            rows = np.isin(ids, self._map.keyframes[k].ids)
-            again, pixels = find_again(
-                self._map,
-                k,
-                ids[rows],
-                new.image,
-                expected[rows],
-                self._parameters.patch_px,
-                1,
-            )
-            near = np.linalg.norm(pixels - expected[np.searchsorted(ids, again)], axis=1)
-            again, pixels = again[near < REUSE_SEARCH_PX], pixels[near < REUSE_SEARCH_PX]
-            found_ids.append(again)
-            found_px.append(pixels)
-            left = ~np.isin(ids, again)
-            ids, expected = ids[left], expected[left]
-        if not found_ids:
-            return False
-        found, pixels = np.concatenate(found_ids), np.concatenate(found_px)
+        found, pixels = find_in_keyframes(
+            self._map,
+            chosen,
+            ids,
+            new.image,
+            expected,
+            self._parameters.patch_px,
+            levels=1,
+            search_px=REUSE_SEARCH_PX,
+        )
         return self._take_back(keyframe, new, found, pixels)
 
     def _take_back(

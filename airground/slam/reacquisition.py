@@ -105,3 +105,43 @@ def find_again(
         old.image, image, pixels, start.astype(np.float32), window_px, levels, MAX_RETURN_PX
     )
     return ids[found], found_px[found]
+
+
+def find_in_keyframes(
+    sparse_map: SparseMap,
+    keyframes: list[int],
+    ids: NDArray[np.int64],
+    image: NDArray[np.uint8],
+    expected: NDArray[np.float64],
+    window_px: int,
+    levels: int,
+    search_px: float = np.inf,
+) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+    """Follow points from several old keyframes into an image, each from the first that has it.
+
+    Args:
+        sparse_map: With the keyframes.
+        keyframes: Which ones, the most similar view first.
+        ids: (n,) points, sorted.
+        image: (height, width) grey.
+        expected: (n, 2) where the points are expected in `image`.
+        window_px, levels: As in `optical_flow.flow`.
+        search_px: A point found farther than this from where it was expected is another.
+
+    Returns:
+        Numbers of the points that were found, and (m, 2) pixels in `image`.
+    """
+    found_ids = [np.empty(0, np.int64)]
+    found_px = [np.empty((0, 2), np.float32)]
+    for k in keyframes:
+        rows = np.isin(ids, sparse_map.keyframes[k].ids)
+        again, pixels = find_again(
+            sparse_map, k, ids[rows], image, expected[rows], window_px, levels
+        )
+        off_px = np.linalg.norm(pixels - expected[np.searchsorted(ids, again)], axis=1)
+        again, pixels = again[off_px < search_px], pixels[off_px < search_px]
+        found_ids.append(again)
+        found_px.append(pixels)
+        left = ~np.isin(ids, again)
+        ids, expected = ids[left], expected[left]
+    return np.concatenate(found_ids), np.concatenate(found_px)

@@ -13,7 +13,7 @@ from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam.geometry.pose_estimation import PoseFit, estimate_pose
 from airground.slam.geometry.relocalization import KeyframeIndex
-from airground.slam.reacquisition import find_again, keyframes_in_view, visible
+from airground.slam.reacquisition import find_in_keyframes, keyframes_in_view, visible
 from airground.slam.sparse_map import SparseMap
 
 MIN_FOUND = 20
@@ -96,20 +96,9 @@ class Recovery:
         ids, expected = ids[inside], expected[inside]
         seen = (self._map, candidates, T_map_camera, self._T_rig_camera, ids, KEYFRAMES, least)
         chosen = keyframes_in_view(*seen) or keyframes_in_view(*seen, MAX_TURN_DEG)
-        found_ids: list[NDArray[np.int64]] = []
-        found_px: list[NDArray[np.float32]] = []
-        for k in chosen:
-            rows = np.isin(ids, self._map.keyframes[k].ids)
-            again, pixels = find_again(
-                self._map, k, ids[rows], image, expected[rows], self._parameters.patch_px, LEVELS
-            )
-            found_ids.append(again)
-            found_px.append(pixels)
-            left = ~np.isin(ids, again)
-            ids, expected = ids[left], expected[left]
-        if sum(map(len, found_ids)) < least:
-            return None
-        again, found = np.concatenate(found_ids), np.concatenate(found_px)
+        again, found = find_in_keyframes(
+            self._map, chosen, ids, image, expected, self._parameters.patch_px, LEVELS
+        )
         return self._agreed(again, found, T_map_camera, least, TURN_SIGMA if turn_known else None)
 
     def anywhere(self, image: NDArray[np.uint8]) -> Found | None:
