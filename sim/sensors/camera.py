@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -89,15 +90,18 @@ class ImageSensor:
         Returns:
             (height, width, channels) uint8.
         """
-        motion = pixel_motion(depth, self.camera, T_start_end)
-        gain = np.float32(self.drift.gain(time_s))
-        read, shot = np.float32(self.noise.read_noise**2), np.float32(self.noise.shot_noise)
-        image = np.empty_like(sharp)
-        for channel in range(sharp.shape[2]):
-            key = noise_key(rng)
-            plane = sharp[..., channel].astype(np.float32)
-            _expose(plane, motion, self.vignette, gain, read, shot, key, image[..., channel])
-        return image
+        planes = cv2.split(sharp)
+        keys = np.array([noise_key(rng) for _ in planes], np.uint64)
+        exposed = _expose(
+            np.stack(planes),
+            *_motion_terms(depth, self.camera, T_start_end),
+            self.vignette,
+            np.float32(self.drift.gain(time_s)),
+            np.float32(self.noise.read_noise**2),
+            np.float32(self.noise.shot_noise),
+            keys,
+        )
+        return np.asarray(cv2.merge(list(exposed)), np.uint8).reshape(sharp.shape)
 
 
 def pixel_motion(
@@ -113,54 +117,151 @@ def pixel_motion(
         camera: Intrinsics.
         T_start_end: The camera's motion.
     """
-    twist = T_start_end.log().astype(np.float32)
-    intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
-    return _pixel_motion(depth, intrinsics, twist)
-
-
-@njit(cache=True, error_model="numpy")
-def _pixel_motion(depth, intrinsics, twist):  # type: ignore[no-untyped-def]
-    height, width = depth.shape
-    fx, fy, cx, cy = intrinsics
-    vx, vy, vz, wx, wy, wz = twist
-    motion = np.empty((height, width, 2), np.float32)
-    for row in range(height):
-        y = (row - cy) / fy
-        for column in range(width):
-            x = (column - cx) / fx
-            inverse = np.float32(1.0) / depth[row, column]
-            if not inverse > 0:
-                inverse = np.float32(0.0)
-            dx = -vx * inverse - (wy - wz * y)
-            dy = -vy * inverse - (wz * x - wx)
-            dz = -vz * inverse - (wx * y - wy * x)
-            motion[row, column, 0] = fx * (dx - x * dz)
-            motion[row, column, 1] = fy * (dy - y * dz)
+    depth, x_rays, y_rays, focal_px, twist = _motion_terms(depth, camera, T_start_end)
+    motion = np.empty((*depth.shape, 2), np.float32)
+    for row in range(len(depth)):
+        _row_motion(
+            depth[row], x_rays, y_rays[row], focal_px, twist, motion[row, :, 0], motion[row, :, 1]
+        )
     return motion
 
 
+def _motion_terms(
+    depth: NDArray[np.float32], camera: PinholeCamera, T_start_end: SE3
+) -> tuple[NDArray[np.float32], NDArray, NDArray, NDArray[np.float32], NDArray[np.float32]]:
+    """Depth, x / z of every column, y / z of every row, focal lengths, and the twist."""
+    fx, fy, cx, cy = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
+    x_rays = (np.arange(camera.width) - np.float64(cx)) / np.float64(fx)
+    y_rays = (np.arange(camera.height) - np.float64(cy)) / np.float64(fy)
+    return depth, x_rays, y_rays, np.array([fx, fy]), T_start_end.log().astype(np.float32)
+
+
+# Each loop below does one kind of work along a row, and has no branch: so the compiler
+# vectorizes all but the gathers.
+
+
 @njit(cache=True, error_model="numpy")
-def _expose(sharp, motion, vignette, gain, read, shot, key, image):  # type: ignore[no-untyped-def]
-    """Average along each pixel's motion, then light losses, noise and rounding."""
-    height, width = sharp.shape
-    zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
-    last_x, last_y = np.float32(width - 1), np.float32(height - 1)
+def _row_motion(depth, x_rays, y, focal_px, twist, mx, my):  # type: ignore[no-untyped-def]
+    """Pixel motion of one row, into `mx` and `my`."""
+    fx, fy = focal_px
+    vx, vy, vz, wx, wy, wz = twist
+    for column in range(len(depth)):
+        x = x_rays[column]
+        inverse = np.float32(1) / depth[column]
+        inverse = inverse if inverse > 0 else np.float32(0)
+        dx = -vx * inverse - (wy - wz * y)
+        dy = -vy * inverse - (wz * x - wx)
+        dz = -vz * inverse - (wx * y - wy * x)
+        mx[column] = fx * (dx - x * dz)
+        my[column] = fy * (dy - y * dz)
+
+
+@njit(cache=True, error_model="numpy")
+def _expose(  # type: ignore[no-untyped-def]
+    planes, depth, x_rays, y_rays, focal_px, twist, vignette, gain, read, shot, keys
+):
+    """(channels, height, width): each pixel's mean along its motion, with all faults."""
+    channels, height, width = planes.shape
+    quads = np.empty((channels, height * width), np.uint32)
+    for channel in range(channels):
+        _pack_quads(planes[channel], quads[channel])
+    image = np.empty_like(planes)
+    mx, my = np.empty(width, np.float32), np.empty(width, np.float32)
+    samples, step = np.empty(width, np.float32), np.empty(width, np.float32)
+    along = np.empty(width, np.float32)
+    ax, ay = np.empty(width, np.float32), np.empty(width, np.float32)
+    index, corners = np.empty(width, np.int32), np.empty(width, np.uint32)
+    light = np.empty((channels, width), np.float32)
     for row in range(height):
-        for column in range(width):
-            mx, my = motion[row, column, 0], motion[row, column, 1]
-            samples = min(1 + int(np.ceil(max(abs(mx), abs(my)))), MAX_SAMPLES)
-            step = one / np.float32(samples)
-            along = half * step - half
-            light = zero
-            for _ in range(samples):
-                x = min(max(np.float32(column) + along * mx, zero), last_x)
-                y = min(max(np.float32(row) + along * my, zero), last_y)
-                along += step
-                x0, y0 = min(int(x), width - 2), min(int(y), height - 2)
-                ax, ay = x - np.float32(x0), y - np.float32(y0)
-                top = sharp[y0, x0] + ax * (sharp[y0, x0 + 1] - sharp[y0, x0])
-                bottom = sharp[y0 + 1, x0] + ax * (sharp[y0 + 1, x0 + 1] - sharp[y0 + 1, x0])
-                light += top + ay * (bottom - top)
-            light *= step * gain * vignette[row, column]
-            light += np.sqrt(read + shot * light) * gaussian(key, row * width + column)
-            image[row, column] = np.uint8(min(max(light + half, zero), np.float32(255)))
+        _row_motion(depth[row], x_rays, y_rays[row], focal_px, twist, mx, my)
+        most = _sampling(mx, my, samples, step, along)
+        light[:] = 0
+        for sample in range(most):
+            _sample_places(row, height, mx, my, step, along, index, ax, ay)
+            for channel in range(channels):
+                _gather(quads[channel], index, corners)
+                _add_sample(np.float32(sample), samples, corners, ax, ay, light[channel])
+        for channel in range(channels):
+            _develop(
+                light[channel], step, gain, vignette[row], read, shot,
+                keys[channel], row * width, image[channel, row],
+            )  # fmt: skip
+    return image
+
+
+@njit(cache=True)
+def _pack_quads(plane, quads):  # type: ignore[no-untyped-def]
+    """Each pixel and its neighbours right, below and below right, in one word to gather."""
+    height, width = plane.shape
+    for row in range(height - 1):
+        top, bottom = plane[row], plane[row + 1]
+        words = quads[row * width : (row + 1) * width]
+        for column in range(width - 1):
+            words[column] = (
+                np.uint32(top[column])
+                | np.uint32(top[column + 1]) << np.uint32(8)
+                | np.uint32(bottom[column]) << np.uint32(16)
+                | np.uint32(bottom[column + 1]) << np.uint32(24)
+            )
+
+
+@njit(cache=True, error_model="numpy")
+def _sampling(mx, my, samples, step, along):  # type: ignore[no-untyped-def]
+    """How many samples each pixel takes, their spacing and the first; returns the most."""
+    half, one, limit = np.float32(0.5), np.float32(1), np.float32(MAX_SAMPLES)
+    most = np.float32(1)
+    for column in range(len(mx)):
+        count = min(one + np.ceil(max(abs(mx[column]), abs(my[column]))), limit)
+        samples[column] = count
+        step[column] = one / count
+        along[column] = half * step[column] - half
+    for column in range(len(mx)):
+        most = max(most, samples[column])
+    return int(most)
+
+
+@njit(cache=True)
+def _sample_places(row, height, mx, my, step, along, index, ax, ay):  # type: ignore[no-untyped-def]
+    """Each pixel's next place along its motion: its quad and the place within, in [0, 1]."""
+    width, zero = len(mx), np.float32(0)
+    last_x, last_y = np.float32(width - 1), np.float32(height - 1)
+    last_x0, last_y0 = np.int32(width - 2), np.int32(height - 2)
+    for column in range(width):
+        x = min(max(np.float32(column) + along[column] * mx[column], zero), last_x)
+        y = min(max(np.float32(row) + along[column] * my[column], zero), last_y)
+        along[column] += step[column]
+        x0, y0 = min(np.int32(x), last_x0), min(np.int32(y), last_y0)
+        ax[column], ay[column] = x - np.float32(x0), y - np.float32(y0)
+        index[column] = y0 * np.int32(width) + x0
+
+
+@njit(cache=True)
+def _gather(quads, index, corners):  # type: ignore[no-untyped-def]
+    for column in range(len(index)):
+        corners[column] = quads[index[column]]
+
+
+@njit(cache=True)
+def _add_sample(sample, samples, corners, ax, ay, light):  # type: ignore[no-untyped-def]
+    """Add the bilinear value to the light of all pixels that take this many samples."""
+    byte, zero = np.uint32(255), np.float32(0)
+    for column in range(len(light)):
+        word = corners[column]
+        left = np.float32(np.int32(word & byte))
+        right = np.float32(np.int32(word >> np.uint32(8) & byte))
+        low_left = np.float32(np.int32(word >> np.uint32(16) & byte))
+        low_right = np.float32(np.int32(word >> np.uint32(24)))
+        top = left + ax[column] * (right - left)
+        bottom = low_left + ax[column] * (low_right - low_left)
+        value = top + ay[column] * (bottom - top)
+        light[column] += value if sample < samples[column] else zero
+
+
+@njit(cache=True)
+def _develop(light, step, gain, vignette, read, shot, key, first, image):  # type: ignore[no-untyped-def]
+    """Light losses, noise and rounding; `first` is the number of the row's first pixel."""
+    zero, half, white = np.float32(0), np.float32(0.5), np.float32(255)
+    for column in range(len(light)):
+        mean = light[column] * (step[column] * gain * vignette[column])
+        noisy = mean + np.sqrt(read + shot * mean) * gaussian(key, first + column)
+        image[column] = np.uint8(min(max(noisy + half, zero), white))
