@@ -60,21 +60,21 @@ def kinect_depth(
         depth,
         incidence,
         shadow,
-        _correlated(height, width, rng),
+        correlated_noise(height, width, rng),
         noise_key(rng),
-        _patches(height, width, rng),
+        patch_noise(height, width, rng),
         parameters,
     )
 
 
-def _correlated(height: int, width: int, rng: np.random.Generator) -> NDArray:
+def correlated_noise(height: int, width: int, rng: np.random.Generator) -> NDArray:
     """Unit noise over which the matching window has averaged."""
     white = rng.standard_normal((height, width), dtype=np.float32)
     smooth = cv2.GaussianBlur(white, (0, 0), _CORRELATION_PX)
     return smooth * np.float32(2 * np.sqrt(np.pi) * _CORRELATION_PX)
 
 
-def _patches(height: int, width: int, rng: np.random.Generator) -> NDArray:
+def patch_noise(height: int, width: int, rng: np.random.Generator) -> NDArray:
     """Noise that is alike over patches of the image."""
     coarse = rng.standard_normal((height // _PATCH_PX, width // _PATCH_PX), dtype=np.float32)
     return cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
@@ -82,50 +82,63 @@ def _patches(height: int, width: int, rng: np.random.Generator) -> NDArray:
 
 def incidence_angles(depth: NDArray[np.float32], camera: PinholeCamera) -> NDArray[np.float32]:
     """(height, width) angle between each ray and the surface's normal [rad], NaN at holes."""
-    intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
-    return _incidence_angles(depth, intrinsics)
+    fx, fy, cx, cy = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
+    x_rays = (np.arange(camera.width, dtype=np.float32) - cx) / fx
+    y_rays = (np.arange(camera.height, dtype=np.float32) - cy) / fy
+    return _incidence_angles(depth, x_rays, y_rays, np.array([fx, fy]))
+
+
+# Each loop below does one kind of work along a row, and most have no branch: so the compiler
+# vectorizes all but the gathers.
 
 
 @njit(cache=True, error_model="numpy")
-def _incidence_angles(depth, intrinsics):  # type: ignore[no-untyped-def]
+def _incidence_angles(depth, x_rays, y_rays, focal_px):  # type: ignore[no-untyped-def]
     """Normals from the slopes of inverse depth, which is linear in the pixel on a plane.
 
     On each axis the smaller of the two one-sided slopes is taken, so that silhouettes do
     not count as surfaces.
     """
     height, width = depth.shape
-    fx, fy, cx, cy = intrinsics
-    one = np.float32(1)
-    inverse = one / depth
-    angles = np.full((height, width), np.nan, np.float32)
+    inverse = np.float32(1) / depth
+    cosines = np.empty(width, np.float32)
+    slope_x, slope_y = np.empty(width, np.float32), np.empty(width, np.float32)
+    angles = np.empty((height, width), np.float32)
     for row in range(height):
-        up, down = max(row - 1, 0), min(row + 1, height - 1)
-        for column in range(width):
-            left, right = max(column - 1, 0), min(column + 1, width - 1)
-            here = inverse[row, column]
-            slope_x = _smaller(
-                here - inverse[row, left], inverse[row, right] - here, left, column, right
-            )
-            slope_y = _smaller(
-                here - inverse[up, column], inverse[down, column] - here, up, row, down
-            )
-            # The plane n . X = 1 has 1/z = n . ray, with ray = ((u-cx)/fx, (v-cy)/fy, 1).
-            x, y = (np.float32(column) - cx) / fx, (np.float32(row) - cy) / fy
-            nx, ny = slope_x * fx, slope_y * fy
-            nz = here - nx * x - ny * y
-            length = np.sqrt((nx * nx + ny * ny + nz * nz) * (x * x + y * y + one))
-            angles[row, column] = np.arccos(min(here / length, one))
+        here = inverse[row]
+        first, last = row == 0, row == height - 1
+        up, down = inverse[max(row - 1, 0)], inverse[min(row + 1, height - 1)]
+        _smaller_slopes(up, here, down, first, last, slope_y)
+        _smaller_slopes(here[:-2], here[1:-1], here[2:], False, False, slope_x[1:-1])
+        _smaller_slopes(here[:1], here[:1], here[1:2], True, False, slope_x[:1])
+        _smaller_slopes(here[-2:-1], here[-1:], here[-1:], False, True, slope_x[-1:])
+        _cosines(here, slope_x, slope_y, x_rays, y_rays[row], focal_px, cosines)
+        angles[row] = np.arccos(cosines)
     return angles
 
 
-@njit(cache=True, error_model="numpy", inline="always")
-def _smaller(before, after, low, middle, high):  # type: ignore[no-untyped-def]
+@njit(cache=True, error_model="numpy")
+def _smaller_slopes(before, here, after, first, last, slopes):  # type: ignore[no-untyped-def]
     """The one-sided difference of least size among those that exist."""
-    if low == middle or not abs(before) <= abs(after):
-        if high == middle or not abs(after) >= 0:
-            return before
-        return after
-    return before
+    for k in range(len(slopes)):
+        back, ahead = here[k] - before[k], after[k] - here[k]
+        no_back = first | (not abs(back) <= abs(ahead))
+        no_ahead = last | (not abs(ahead) >= 0)
+        slopes[k] = ahead if no_back & (not no_ahead) else back
+
+
+@njit(cache=True, error_model="numpy")
+def _cosines(inverse, slope_x, slope_y, x_rays, y, focal_px, cosines):  # type: ignore[no-untyped-def]
+    """Of the angles between one row's rays and the surface's normals."""
+    fx, fy = focal_px
+    one = np.float32(1)
+    for column in range(len(inverse)):
+        # The plane n . X = 1 has 1/z = n . ray, with ray = ((u-cx)/fx, (v-cy)/fy, 1).
+        x = x_rays[column]
+        nx, ny = slope_x[column] * fx, slope_y[column] * fy
+        nz = inverse[column] - nx * x - ny * y
+        length = np.sqrt((nx * nx + ny * ny + nz * nz) * (x * x + y * y + one))
+        cosines[column] = min(inverse[column] / length, one)
 
 
 @njit(cache=True, error_model="numpy")
@@ -136,61 +149,93 @@ def projector_shadow(depth, focal_times_baseline):  # type: ignore[no-untyped-de
     the same place the nearer one takes the light.
     """
     height, width = depth.shape
-    shadow = np.zeros((height, width), np.bool_)
+    shadow = np.empty((height, width), np.bool_)
     margin = int(focal_times_baseline / 0.2)
-    nearest = np.empty(width + margin + 2, np.float32)
+    nowhere = width + margin + 1
+    disparity, place = np.empty(width, np.float64), np.empty(width, np.float64)
+    light, nearest = np.empty(nowhere + 1, np.float32), np.zeros(nowhere + 1, np.float32)
     for row in range(height):
-        nearest[:] = 0
+        _projected(depth[row], focal_times_baseline, margin, nowhere, disparity, place)
+        light[:] = 0
         for column in range(width):
-            disparity = focal_times_baseline / depth[row, column]
-            if not (disparity > 0 and disparity < margin):
-                continue
-            place = column - disparity + margin
-            cell = int(place)
-            nearest[cell] = max(nearest[cell], disparity)
-            nearest[cell + 1] = max(nearest[cell + 1], disparity)
+            cell = np.int32(place[column])
+            light[cell] = max(light[cell], np.float32(disparity[column]))
+        # A pixel covers its place and the next.
+        nearest[0] = light[0]
+        nearest[1:] = np.maximum(light[1:], light[:-1])
         for column in range(width):
-            disparity = focal_times_baseline / depth[row, column]
-            if not (disparity > 0 and disparity < margin):
-                continue
-            cell = int(column - disparity + margin + 0.5)
-            shadow[row, column] = nearest[cell] > disparity + 1
+            cell = np.int32(place[column] + 0.5)
+            shadow[row, column] = nearest[cell] > disparity[column] + 1
     return shadow
 
 
 @njit(cache=True, error_model="numpy")
+def _projected(depth, focal_times_baseline, margin, nowhere, disparity, place):  # type: ignore[no-untyped-def]
+    """Disparity and place of one row's pixels; 0 and `nowhere` where there is nothing."""
+    for column in range(len(depth)):
+        exact = np.float64(focal_times_baseline / depth[column])
+        seen = (exact > 0) & (exact < margin)
+        disparity[column] = exact if seen else 0.0
+        place[column] = column - exact + margin if seen else np.float64(nowhere)
+
+
+@njit(cache=True, error_model="numpy")
 def _measure(depth, incidence, shadow, axial, key, patches, parameters):  # type: ignore[no-untyped-def]
-    (scale, lateral_px, disparity_metres, step, limit, spread, nearest, farthest) = parameters
     height, width = depth.shape
-    measured = np.full((height, width), np.nan, np.float32)
-    half_pi = np.float32(np.pi / 2)
+    depths, shadows = depth.reshape(-1), shadow.reshape(-1)
+    measured = np.empty((height, width), np.float32)
+    index, grazing = np.empty(width, np.int32), np.empty(width, np.float32)
+    there, lit = np.empty(width, np.float32), np.empty(width, np.bool_)
     for row in range(height):
+        _ragged_places(row, height, incidence[row], key, parameters, grazing, index)
         for column in range(width):
-            z, theta = depth[row, column], incidence[row, column]
-            if shadow[row, column] or not z > 0:
-                continue
-            if theta + spread * patches[row, column] > limit:
-                continue
-            grazing = theta / max(half_pi - theta, np.float32(0.02))
-            # Eq. 2: silhouettes are ragged. Inside a surface the shift changes nothing.
-            reach = lateral_px + np.float32(0.035) * grazing
-            index = 3 * (row * width + column)
-            x = int(np.round(np.float32(column) + reach * gaussian(key, index)))
-            y = int(np.round(np.float32(row) + reach * gaussian(key, index + 1)))
-            x, y = min(max(x, 0), width - 1), min(max(y, 0), height - 1)
-            there = depth[y, x]
-            slack = np.float32(0.02) * z * (1 + grazing)
-            if not abs(there - z) < slack:
-                # Half of the windows across a silhouette match nothing.
-                if gaussian(key, index + 2) > 0 or shadow[y, x]:
-                    continue
-                z = there
-            # Eq. 3 and 4: axial noise, with the term for grazing angles.
-            sigma = np.float32(0.0012) + np.float32(0.0019) * (z - np.float32(0.4)) ** 2
-            sigma += np.float32(0.0001) / np.sqrt(z) * grazing**2
-            z += scale * sigma * axial[row, column]
-            if not (z >= nearest and z <= farthest):
-                continue
-            disparity = np.round(disparity_metres / z / step) * step
-            measured[row, column] = disparity_metres / disparity
+            there[column], lit[column] = depths[index[column]], not shadows[index[column]]
+        _measure_row(
+            depth[row], incidence[row], shadow[row], axial[row], patches[row], key, row * width,
+            grazing, there, lit, parameters, measured[row],
+        )  # fmt: skip
     return measured
+
+
+@njit(cache=True, error_model="numpy")
+def _ragged_places(row, height, incidence, key, parameters, grazing, index):  # type: ignore[no-untyped-def]
+    """Eq. 2: silhouettes are ragged. Inside a surface the shift changes nothing."""
+    width, lateral_px = len(incidence), parameters[1]
+    half_pi = np.float32(np.pi / 2)
+    last_x, last_y = np.float32(width - 1), np.float32(height - 1)
+    for column in range(width):
+        theta = incidence[column]
+        grazing[column] = theta / max(half_pi - theta, np.float32(0.02))
+        reach = lateral_px + np.float32(0.035) * grazing[column]
+        number = 3 * (row * width + column)
+        x = np.rint(np.float32(column) + reach * gaussian(key, number))
+        y = np.rint(np.float32(row) + reach * gaussian(key, number + 1))
+        # Holes have no angle and so no place; any will do.
+        x = min(x if x > 0 else np.float32(0), last_x)
+        y = min(y if y > 0 else np.float32(0), last_y)
+        index[column] = np.int32(y) * np.int32(width) + np.int32(x)
+
+
+@njit(cache=True, error_model="numpy")
+def _measure_row(  # type: ignore[no-untyped-def]
+    depth, incidence, shadow, axial, patches, key, first, grazing, there, lit, parameters, measured
+):
+    """One row; `there` and `lit` are what lies at its ragged places."""
+    (scale, _, disparity_metres, step, limit, spread, nearest, farthest) = parameters
+    for column in range(len(depth)):
+        z = depth[column]
+        seen = (not shadow[column]) & (z > 0)
+        seen &= not incidence[column] + spread * patches[column] > limit
+        slack = np.float32(0.02) * z * (1.0 + grazing[column])
+        across = not abs(there[column] - z) < slack
+        # Half of the windows across a silhouette match nothing.
+        matched = (not gaussian(key, 3 * (first + column) + 2) > 0) & lit[column]
+        seen &= matched | (not across)
+        z = there[column] if across else z
+        # Eq. 3 and 4: axial noise, with the term for grazing angles.
+        sigma = np.float32(0.0012) + np.float32(0.0019) * (z - np.float32(0.4)) ** 2
+        sigma += np.float32(0.0001) / np.sqrt(z) * grazing[column] ** 2
+        z += scale * sigma * axial[column]
+        seen &= (z >= nearest) & (z <= farthest)
+        disparity = np.rint(disparity_metres / z / step) * step
+        measured[column] = disparity_metres / disparity if seen else np.float32(np.nan)

@@ -4,14 +4,17 @@ import numpy as np
 import pytest
 
 from airground.core.camera import PinholeCamera
-from sim.presets import HARSH, NOMINAL
+from sim.presets import HARSH, NOMINAL, DepthNoise
 from sim.sensors.depth import (
     BASELINE_M,
     INFRARED_FOCAL_PX,
+    correlated_noise,
     incidence_angles,
     kinect_depth,
+    patch_noise,
     projector_shadow,
 )
+from sim.sensors.hashed_noise import gaussian, noise_key
 
 CAMERA = PinholeCamera(320, 240, 262.5, 262.5, 159.5, 119.5)
 NOISE = NOMINAL.depth
@@ -51,6 +54,96 @@ def test_incidence_of_a_plane(tilt: float) -> None:
 def test_a_silhouette_is_no_surface() -> None:
     angles = np.rad2deg(incidence_angles(step(), CAMERA))
     assert angles.max() < 60  # of the rays alone; the jump in depth adds nothing
+
+
+def angle_of_pixel(inverse: np.ndarray, camera: PinholeCamera, row: int, column: int) -> float:
+    """The obvious twin: the smaller slope on each axis, of those that exist."""
+
+    def slope(line: np.ndarray, k: int) -> float:
+        back = line[k] - line[k - 1] if k > 0 else np.nan
+        ahead = line[k + 1] - line[k] if k + 1 < len(line) else np.nan
+        existing = [s for s in (back, ahead) if np.isfinite(s)]
+        return min(existing, key=abs) if existing else np.nan
+
+    x, y = (column - camera.cx) / camera.fx, (row - camera.cy) / camera.fy
+    nx = slope(inverse[row], column) * camera.fx
+    ny = slope(inverse[:, column], row) * camera.fy
+    normal = np.array([nx, ny, inverse[row, column] - nx * x - ny * y])
+    ray = np.array([x, y, 1.0])
+    cosine = normal @ ray / (np.linalg.norm(normal) * np.linalg.norm(ray))
+    return float(np.arccos(min(cosine, 1.0)))
+
+
+def uneven(camera: PinholeCamera) -> np.ndarray:
+    """Depth of a tilted, rough surface with a jump and holes, some at the border's inside."""
+    rows, columns = np.mgrid[: camera.height, : camera.width]
+    depth = 1.2 + 0.01 * columns + 0.02 * rows + 0.004 * rng().standard_normal(rows.shape)
+    depth[4:12, 8:15] -= 0.5
+    depth[rng(1).random(depth.shape) < 0.05] = np.nan
+    depth[:2], depth[-2:], depth[:, :2], depth[:, -2:] = 1.5, 1.6, 1.7, 1.8
+    return depth.astype(np.float32)
+
+
+@pytest.mark.kernel
+def test_incidence_is_that_of_the_obvious_twin() -> None:
+    camera = PinholeCamera(24, 18, 30.0, 31.0, 11.0, 9.5)
+    depth = uneven(camera)
+    inverse = 1 / depth.astype(np.float64)
+    twin = [angle_of_pixel(inverse, camera, *pixel) for pixel in np.ndindex(depth.shape)]
+    angles = incidence_angles(depth, camera).ravel()
+    np.testing.assert_array_equal(np.isnan(angles), np.isnan(twin))
+    # Head-on the angle is a square root of the rounding errors.
+    np.testing.assert_allclose(angles, twin, atol=2e-3)
+
+
+def measured_pixel_by_pixel(
+    depth: np.ndarray, camera: PinholeCamera, noise: DepthNoise, draw: np.random.Generator
+) -> np.ndarray:
+    """The obvious twin of `kinect_depth`, in double precision, given what it draws."""
+    height, width = depth.shape
+    axial = correlated_noise(height, width, draw)
+    key = noise_key(draw)
+    patches = patch_noise(height, width, draw)
+    incidence = incidence_angles(depth, camera).astype(float)
+    shadow = projector_shadow(depth, camera.fx * BASELINE_M)
+    measured = np.full(depth.shape, np.nan)
+    for row, column in np.ndindex(height, width):
+        z, theta = float(depth[row, column]), incidence[row, column]
+        softened = theta + np.deg2rad(noise.grazing_spread_deg) * patches[row, column]
+        if np.isnan(theta) or shadow[row, column] or softened > np.deg2rad(noise.grazing_limit_deg):
+            continue
+        grazing = theta / max(np.pi / 2 - theta, 0.02)
+        first = 3 * (row * width + column)
+        shift_x, shift_y, coin = (float(gaussian(key, first + k)) for k in range(3))
+        reach = noise.lateral_px + 0.035 * grazing
+        x = int(np.clip(round(column + reach * shift_x), 0, width - 1))
+        y = int(np.clip(round(row + reach * shift_y), 0, height - 1))
+        if not abs(depth[y, x] - z) < 0.02 * z * (1 + grazing):
+            if coin > 0 or shadow[y, x]:
+                continue
+            z = float(depth[y, x])
+        sigma = 0.0012 + 0.0019 * (z - 0.4) ** 2 + 0.0001 / np.sqrt(z) * grazing**2
+        z += noise.axial_scale * sigma * axial[row, column]
+        if noise.range_m[0] <= z <= noise.range_m[1]:
+            steps = round(INFRARED_FOCAL_PX * BASELINE_M / z / noise.disparity_step_px)
+            measured[row, column] = (
+                INFRARED_FOCAL_PX * BASELINE_M / (steps * noise.disparity_step_px)
+            )
+    return measured
+
+
+@pytest.mark.kernel
+@pytest.mark.filterwarnings("ignore:overflow", "ignore:invalid", "ignore:divide")  # uncompiled
+def test_measured_depth_is_that_of_the_obvious_twin() -> None:
+    """Up to rounding: float32 may fall on the other side of a disparity's step."""
+    camera = PinholeCamera(64, 48, 50.0, 51.0, 31.0, 23.5)
+    depth = uneven(camera)
+    measured = kinect_depth(depth, camera, NOISE, rng(2))
+    twin = measured_pixel_by_pixel(depth, camera, NOISE, rng(2))
+    assert 0.1 < np.isnan(twin).mean() < 0.9
+    assert (np.isnan(measured) != np.isnan(twin)).mean() < 0.002
+    both = np.isfinite(measured) & np.isfinite(twin)
+    assert (np.abs(measured - twin)[both] > 1e-5).mean() < 0.002
 
 
 @pytest.mark.parametrize("distance", [0.8, 1.5, 2.5, 4.0])
