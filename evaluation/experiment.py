@@ -25,6 +25,7 @@ from evaluation.trials import (
     refine_sighting,
     sequence_starts,
 )
+from sim.rendered import Flight, rendered
 from sim.truth import Truth
 
 
@@ -46,21 +47,23 @@ class Task:
     """One recording and the setups that share their maps: the unit of parallel work.
 
     Attributes:
-        recording: Where it is.
+        recording: Where it is, or what it would be made from, to draw its images on the fly.
         seed, flight: What it was made from; they seed the trials too.
         setups: What to measure; all make the same maps.
         protocol: How much of it.
         showcase: Whether to gather what pictures need, of the first setup.
         budget: Whether to measure what each stage loses, with the first setup.
+        renderers: Processes that draw images on the fly.
     """
 
-    recording: Path
+    recording: Path | Flight
     seed: int
     flight: int
     setups: list[Setup]
     protocol: Protocol
     showcase: bool = False
     budget: bool = False
+    renderers: int = 1
 
 
 @dataclass(frozen=True)
@@ -73,8 +76,14 @@ class Outcome:
 
 def run_task(task: Task) -> Outcome:
     """Measure everything that a task asks for."""
-    recording = Recording.open(task.recording)
-    truth = Truth.open(task.recording)
+    if isinstance(task.recording, Flight):
+        with rendered(task.recording, task.renderers) as recording:
+            return _measured(recording, task)
+    return _measured(Recording.open(task.recording), task)
+
+
+def _measured(recording: Recording, task: Task) -> Outcome:
+    truth = Truth.open(recording.path)
     maps = map_recording(recording, truth, task.setups[0], task.seed)
     rows: list[Row] = []
     for setup in task.setups:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.progress import track
@@ -16,6 +16,7 @@ from evaluation.showcase import Showcase
 from evaluation.workers import outcomes
 from sim.presets import SensorPreset
 from sim.recorder import record
+from sim.rendered import Flight
 from sim.scene import Scene
 
 log = logging.getLogger(__name__)
@@ -52,22 +53,24 @@ class Findings:
     showcase: Showcase | None
 
 
-def reproduce(plan: Plan, recordings: Path, workers: int | None = None) -> Findings:
+def reproduce(plan: Plan, recordings: Path | None, workers: int | None = None) -> Findings:
     """Record what is not there yet, and measure all of it.
 
     Args:
         plan: What to do.
-        recordings: Folder of the recordings; those in it with the right name are used.
+        recordings: Folder of the recordings; those in it with the right name are used. None
+            keeps none: images are drawn while they are measured, once more for each pass.
         workers: Processes at a time; None for one a core. The result does not depend on it.
     """
     tasks: list[Task] = []
     for scene in plan.scenes:
         for flight in range(plan.flights):
-            path = _recorded(plan, scene, flight, recordings, workers)
+            what = Flight(scene, plan.seed, flight, plan.sensors)
+            recording = what if recordings is None else _recorded(what, recordings, workers)
             for setups in grouped_by_maps(plan.setups):
                 tasks.append(
                     Task(
-                        path,
+                        recording,
                         plan.seed,
                         flight,
                         setups,
@@ -76,17 +79,21 @@ def reproduce(plan: Plan, recordings: Path, workers: int | None = None) -> Findi
                         budget=plan.budget and setups[0] is plan.setups[0],
                     )
                 )
-    return _measured(tasks, workers or usable_cores())
+    workers = workers or usable_cores()
+    renderers = max(1, workers // len(tasks)) if tasks else 1
+    return _measured([replace(task, renderers=renderers) for task in tasks], workers)
 
 
-def _recorded(plan: Plan, scene: Scene, flight: int, folder: Path, workers: int | None) -> Path:
+def _recorded(flight: Flight, folder: Path, workers: int | None) -> Path:
     """The recording of one flight, made if it is not there yet."""
-    path = folder / f"{scene.name}_{plan.sensors.name}_seed{plan.seed}_flight{flight}"
+    name = f"{flight.scene.name}_{flight.sensors.name}_seed{flight.seed}_flight{flight.flight}"
+    path = folder / name
     if path.exists():
         log.info("using the recording %s", path)
     else:
         folder.mkdir(parents=True, exist_ok=True)
-        record(scene, plan.seed, plan.sensors, path, workers=workers, flight=flight)
+        what = flight.scene, flight.seed, flight.sensors
+        record(*what, path, workers=workers, flight=flight.flight)
     return path
 
 

@@ -1,4 +1,4 @@
-"""Images of a flight: any frame of either robot, the same bytes whoever makes it and when."""
+"""Images of a flight: any frame of either robot, the same whoever makes it and when."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class Written:
 
 
 class FrameMaker:
-    """Draws frames, puts their sensors' faults on them and writes them.
+    """Draws frames and puts their sensors' faults on them; writes them where asked.
 
     A context manager, for the graphics context.
     """
@@ -91,23 +91,28 @@ class FrameMaker:
     def make(self, robot: Robot, index: int) -> list[Written]:
         """Write the files of one frame."""
         stamp = int(self._plan.stamps_ns[robot][index])
-        time_ns = stamp + self._table(robot).camera.time_offset_ns
-        # Noise depends on the frame alone, not on who makes it. Counted from 1, for numpy
-        # takes [a] and [a, 0] as the same seed.
-        rng = np.random.default_rng([*self._plan.seeds, ROBOTS.index(robot) + 1, index + 1])
-        return (
-            self._mav(stamp, time_ns, rng) if robot == "mav" else self._ground(stamp, time_ns, rng)
-        )
+        if robot == "mav":
+            return [self._write(layout.MAV_IMAGES, mav_image_name(stamp), self.mav(index))]
+        colour, depth_units = self.ground(index)
+        name = ground_image_name(stamp)
+        return [
+            self._write(layout.GROUND_COLOUR, name, cv2.cvtColor(colour, cv2.COLOR_RGB2BGR)),
+            self._write(layout.GROUND_DEPTH, name, depth_units),
+        ]
 
-    def _mav(self, stamp: int, time_ns: int, rng: np.random.Generator) -> list[Written]:
+    def mav(self, index: int) -> NDArray[np.uint8]:
+        """(height, width) grey image of the MAV."""
+        time_ns, rng = self._start("mav", index)
         T_world_camera = self._motion.camera_pose("mav", time_ns)
         colour, depth = self._renderer.colour_and_rough_depth("mav", T_world_camera)
         grey = cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY)[..., None]
         if "mav" in self._sensors:
             grey = self._expose("mav", grey, depth, time_ns, rng)
-        return [self._write(layout.MAV_IMAGES, mav_image_name(stamp), grey[..., 0])]
+        return np.asarray(grey[..., 0], np.uint8)
 
-    def _ground(self, stamp: int, time_ns: int, rng: np.random.Generator) -> list[Written]:
+    def ground(self, index: int) -> tuple[NDArray[np.uint8], NDArray[np.uint16]]:
+        """(height, width, 3) RGB and (height, width) depth as PNG values, of the ground robot."""
+        time_ns, rng = self._start("ground", index)
         T_world_camera = self._motion.camera_pose("ground", time_ns)
         colour = self._renderer.colour("ground", T_world_camera)
         depth = self._renderer.depth("ground", T_world_camera)
@@ -116,12 +121,15 @@ class FrameMaker:
         if self._plan.preset.depth is not None:
             camera = self._table("ground").camera.pinhole()
             depth = kinect_depth(depth, camera, self._plan.preset.depth, rng)
-        name = ground_image_name(stamp)
-        bgr = cv2.cvtColor(colour, cv2.COLOR_RGB2BGR)
-        return [
-            self._write(layout.GROUND_COLOUR, name, bgr),
-            self._write(layout.GROUND_DEPTH, name, self._depth_units(depth)),
-        ]
+        return colour, self._depth_units(depth)
+
+    def _start(self, robot: Robot, index: int) -> tuple[int, np.random.Generator]:
+        """When a frame is really taken [ns], and what its noise is drawn from."""
+        stamp = int(self._plan.stamps_ns[robot][index])
+        # Noise depends on the frame alone, not on who makes it. Counted from 1, for numpy
+        # takes [a] and [a, 0] as the same seed.
+        rng = np.random.default_rng([*self._plan.seeds, ROBOTS.index(robot) + 1, index + 1])
+        return stamp + self._table(robot).camera.time_offset_ns, rng
 
     def _expose(
         self, robot: Robot, sharp: NDArray, depth: NDArray, time_ns: int, rng: np.random.Generator

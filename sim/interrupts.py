@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -22,3 +24,15 @@ def end_children() -> None:
     """Stop every process that this one started: nobody waits for their work any more."""
     for child in multiprocessing.active_children():
         child.terminate()
+
+
+def end_with_parent() -> None:
+    """Have this child process end when its parent does, however that ends."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+
+    def wait() -> None:
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()

@@ -105,11 +105,33 @@ def _fill(
     quiet: bool,
 ) -> None:
     """Write a whole recording into an empty folder."""
+    console = Console(stderr=True, quiet=quiet)
+    header, plan = write_all_but_images(root, scene, seed, flight, preset, duration_s)
+    with console.status(f"building {scene.name}"):
+        store_model(plan, scene, seed)
+    digests = _render(plan, workers, console)
+    plan.model.unlink()
+    recording_writer.finish(root, header, digests)
+
+
+def write_all_but_images(
+    root: Path,
+    scene: Scene,
+    seed: int,
+    flight: int,
+    preset: SensorPreset,
+    duration_s: float | None,
+) -> tuple[Header, FramePlan]:
+    """Simulate a flight and write its samples, lists and truth into an empty folder.
+
+    Returns:
+        The header that is to be written last, and what the images are to be made from once
+        `store_model` has stored the world.
+    """
     motion_rng, calibration_rng, mav_rng, ground_rng = np.random.default_rng([seed, flight]).spawn(
         4
     )
-    console = Console(stderr=True, quiet=quiet)
-    # Without pictures first, so that an impossible flight is told at once.
+    # Without pictures, so that an impossible flight is told at once.
     world = build_world(scene, seed, pictures=False)
     motion = simulate_motion(world, scene, int(motion_rng.integers(2**63)), duration_s)
     sensors = calibrate(
@@ -129,15 +151,28 @@ def _fill(
     ground_samples = _samples(motion.stamps_ns, motion.ground, preset, ground_rng)
     recording_writer.write_mav(root, told.mav, stamps["mav"], *mav_samples)
     recording_writer.write_ground(root, told.ground, stamps["ground"], *ground_samples)
-    header = _header(scene, seed, flight, preset, motion, stamps, told)
-    with console.status(f"building {scene.name}"):
-        model = _store_model(root, scene, seed, sensors.true)
     plan = FramePlan(
-        root, model, root / "truth/motion.npz", sensors.true, preset, (seed, flight), stamps
+        recording=root,
+        model=root / "world.mjb",
+        motion=root / "truth/motion.npz",
+        true=sensors.true,
+        preset=preset,
+        seeds=(seed, flight),
+        stamps_ns=stamps,
     )
-    digests = _render(plan, workers, console)
-    model.unlink()
-    recording_writer.finish(root, header, digests)
+    return _header(scene, seed, flight, preset, motion, stamps, told), plan
+
+
+def store_model(plan: FramePlan, scene: Scene, seed: int) -> None:
+    """Build the world with its pictures once for all processes: they take long to make."""
+    world = build_world(scene, seed)
+    true = plan.true
+    cameras = {"mav": true.mav.camera.pinhole(), "ground": true.ground.camera.pinhole()}
+    model = with_cameras(world.spec, cameras)
+    # MuJoCo only prints a warning when the disk is full.
+    if shutil.disk_usage(plan.recording).free < mujoco.mj_sizeModel(model):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    mujoco.mj_saveModel(model, str(plan.model), None)
 
 
 def image_stamps(motion_stamps_ns: NDArray[np.int64], first_ns: int) -> NDArray[np.int64]:
@@ -182,19 +217,6 @@ def _header(
         calibration=told,
         digests={},
     )
-
-
-def _store_model(root: Path, scene: Scene, seed: int, true: CalibrationTable) -> Path:
-    """Build the world with its pictures once for all processes: they take long to make."""
-    world = build_world(scene, seed)
-    cameras = {"mav": true.mav.camera.pinhole(), "ground": true.ground.camera.pinhole()}
-    path = root / "world.mjb"
-    model = with_cameras(world.spec, cameras)
-    # MuJoCo only prints a warning when the disk is full.
-    if shutil.disk_usage(root).free < mujoco.mj_sizeModel(model):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-    mujoco.mj_saveModel(model, str(path), None)
-    return path
 
 
 def _render(plan: FramePlan, workers: int, console: Console) -> dict[str, dict[str, str]]:

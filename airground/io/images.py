@@ -27,7 +27,11 @@ def read_colour(path: Path, width: int, height: int) -> NDArray[np.uint8]:
 
 def read_depth(path: Path, width: int, height: int, units_per_m: float) -> NDArray[np.float32]:
     """(height, width) float32 [m], NaN where the file holds 0; raises RecordingError."""
-    units = _read(path, (height, width), np.uint16)
+    return metric_depth(_read(path, (height, width), np.uint16), units_per_m)
+
+
+def metric_depth(units: NDArray[np.uint16], units_per_m: float) -> NDArray[np.float32]:
+    """Depth [m] from the values of a depth image; NaN for 0."""
     depth = units.astype(np.float32) / np.float32(units_per_m)
     depth[units == 0] = np.nan
     return depth

@@ -24,7 +24,7 @@ from airground.io import layout
 from airground.io.digests import path_digest
 from airground.io.euroc import read_image_list, read_imu, read_magnetic
 from airground.io.header import Header, read_header
-from airground.io.images import read_colour, read_depth, read_grey
+from airground.io.image_source import ImageFiles, ImageSource
 from airground.io.message_order import bundles
 from airground.io.plausibility import (
     CAMERA_STEP_S,
@@ -51,7 +51,7 @@ class Recording:
         mav_camera_stamps, ground_camera_stamps: (N,) int64 of the images [ns].
         mav_imu, ground_imu: All inertial samples.
         mav_magnetic, ground_magnetic: All magnetometer samples.
-        mav_files, ground_colour_files, ground_depth_files: The images, in order of time.
+        images: Gives the images.
     """
 
     path: Path
@@ -64,13 +64,15 @@ class Recording:
     ground_imu: ImuSamples
     mav_magnetic: MagneticSamples
     ground_magnetic: MagneticSamples
-    mav_files: tuple[Path, ...]
-    ground_colour_files: tuple[Path, ...]
-    ground_depth_files: tuple[Path, ...]
+    images: ImageSource
 
     @classmethod
-    def open(cls, path: Path | str) -> Recording:
+    def open(cls, path: Path | str, images: ImageSource | None = None) -> Recording:
         """Open a recording and check everything but the contents of its images.
+
+        Args:
+            path: The recording's folder.
+            images: Where its images come from; its own files if None.
 
         Raises:
             RecordingError: One line that names file, key or stamp and what would be right.
@@ -84,24 +86,34 @@ class Recording:
         ground_stamps, colour_names, depth_names = associations
         _check_count(path / layout.MAV_CAMERA_LIST, len(mav_stamps), header.frames.mav)
         _check_count(path / layout.GROUND_ASSOCIATIONS, len(ground_stamps), header.frames.ground)
-        ground_folder = path / "ground"
+        mav, ground = header.calibration.mav, header.calibration.ground
+        if images is None:
+            images = ImageFiles(
+                mav_files=tuple(path / layout.MAV_IMAGES / name for name in mav_names),
+                ground_colour_files=tuple(path / "ground" / name for name in colour_names),
+                ground_depth_files=tuple(path / "ground" / name for name in depth_names),
+                mav_camera=mav.camera.pinhole(),
+                ground_camera=ground.camera.pinhole(),
+                depth_units_per_m=ground.depth.units_per_m,
+            )
+            images.check_present()
         recording = cls(
             path=path,
             header=header,
-            mav=header.calibration.mav.calibration(),
-            ground=header.calibration.ground.calibration(),
+            mav=mav.calibration(),
+            ground=ground.calibration(),
             mav_camera_stamps=_frozen(mav_stamps),
             ground_camera_stamps=_frozen(ground_stamps),
             mav_imu=read_imu(path / layout.MAV_IMU_DATA),
             ground_imu=read_imu(path / layout.GROUND_IMU_DATA),
             mav_magnetic=read_magnetic(path / layout.MAV_MAGNETOMETER_DATA),
             ground_magnetic=read_magnetic(path / layout.GROUND_MAGNETOMETER_DATA),
-            mav_files=tuple(path / layout.MAV_IMAGES / name for name in mav_names),
-            ground_colour_files=tuple(ground_folder / name for name in colour_names),
-            ground_depth_files=tuple(ground_folder / name for name in depth_names),
+            images=images,
         )
         recording._check_samples()
-        recording._check_images()
+        # The first of each camera must fit its calibration.
+        recording.read_mav_image(0)
+        recording.read_ground_image(0)
         return recording
 
     @property
@@ -164,18 +176,12 @@ class Recording:
 
     def read_mav_image(self, index: int) -> MavImage:
         """The MAV's image at an index in `mav_camera_stamps`."""
-        camera = self.mav.camera
-        image = read_grey(self.mav_files[index], camera.width, camera.height)
-        return MavImage(int(self.mav_camera_stamps[index]), image)
+        return MavImage(int(self.mav_camera_stamps[index]), self.images.mav(index))
 
     def read_ground_image(self, index: int) -> GroundImage:
         """The ground robot's image at an index in `ground_camera_stamps`."""
-        size = self.ground.camera.width, self.ground.camera.height
-        return GroundImage(
-            int(self.ground_camera_stamps[index]),
-            read_colour(self.ground_colour_files[index], *size),
-            read_depth(self.ground_depth_files[index], *size, self.depth_units_per_m),
-        )
+        colour, depth = self.images.ground(index)
+        return GroundImage(int(self.ground_camera_stamps[index]), colour, depth)
 
     def verify(self) -> None:
         """Compare every file with the digests in `recording.toml`.
@@ -206,23 +212,6 @@ class Recording:
             check_stamp_unit(imu.stamps_ns, imu_file, "nanoseconds", IMU_STEP_S)
             check_imu_covers(imu, imu_file, stamps, told.camera_time_offset_ns)
             check_up_in_body(told.T_body_imu.rotation @ upwards(imu, imu_file), imu_file)
-
-    def _check_images(self) -> None:
-        """Every listed image exists, and the first of each camera fits its calibration."""
-        for files in (self.mav_files, self.ground_colour_files, self.ground_depth_files):
-            present = {file for folder in {f.parent for f in files} for file in _listing(folder)}
-            for file in files:
-                if file not in present:
-                    raise RecordingError(f"{file}: this image is listed but missing")
-        self.read_mav_image(0)
-        self.read_ground_image(0)
-
-
-def _listing(folder: Path) -> list[Path]:
-    try:
-        return list(folder.iterdir())
-    except OSError as error:
-        raise RecordingError(f"{folder}: cannot be listed: {error.strerror}") from None
 
 
 def _check_count(path: Path, listed: int, told: int) -> None:

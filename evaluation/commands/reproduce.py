@@ -58,6 +58,9 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, OutWord):
         Path | None, arg(metavar="DIR", help_behavior_hint="(default: recordings/ in --out)")
     ] = None
     """Where recordings are kept; those that are there already are used again."""
+    render: bool = False
+    """Keep no recordings: draw the images while they are measured, once more for each pass.
+    The results are the same, but for times, which then include waiting for images."""
 
     def main(self) -> None:
         from evaluation.output import fresh_folder
@@ -67,7 +70,8 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, OutWord):
 
         plan = self.plan()
         with fresh_folder(self.out) as folder:
-            findings = reproduce(plan, self.recordings or folder / "recordings", self.workers())
+            recordings = None if self.render else self.recordings or folder / "recordings"
+            findings = reproduce(plan, recordings, self.workers())
             results = Results(findings.table, plan.setups[0].config, plan.seed, findings.showcase)
             summary = results.write(folder)
         print_summary(summary)
@@ -83,6 +87,8 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, OutWord):
         setup = self.setup()
         if self.budget and setup.poses != "slam":
             raise InputError("--budget asks what SLAM loses among others; give --poses slam")
+        if self.render and self.recordings is not None:
+            raise InputError("--render keeps no recordings; leave out --recordings")
         scenes = self.scenes or (QUICK_SCENES if self.quick else SCENES)
         return Plan(
             scenes=[load_scene(scene) for scene in scenes],

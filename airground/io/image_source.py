@@ -1,0 +1,69 @@
+"""Where the images of a recording come from: files, or whoever makes them when asked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.camera import PinholeCamera
+from airground.errors import RecordingError
+from airground.io.images import read_colour, read_depth, read_grey
+
+
+class ImageSource(Protocol):
+    """Gives the images of both robots by their index in the recording's stamps."""
+
+    def mav(self, index: int) -> NDArray[np.uint8]:
+        """(height, width) grey."""
+        ...
+
+    def ground(self, index: int) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """(height, width, 3) RGB and (height, width) depth [m], NaN where missing."""
+        ...
+
+
+@dataclass(frozen=True)
+class ImageFiles:
+    """Images on disk, each read when it is asked for.
+
+    Attributes:
+        mav_files, ground_colour_files, ground_depth_files: In order of time.
+        mav_camera, ground_camera: They give the size that the images must have.
+        depth_units_per_m: PNG value of one metre of depth.
+    """
+
+    mav_files: tuple[Path, ...]
+    ground_colour_files: tuple[Path, ...]
+    ground_depth_files: tuple[Path, ...]
+    mav_camera: PinholeCamera
+    ground_camera: PinholeCamera
+    depth_units_per_m: float
+
+    def mav(self, index: int) -> NDArray[np.uint8]:
+        return read_grey(self.mav_files[index], self.mav_camera.width, self.mav_camera.height)
+
+    def ground(self, index: int) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        size = self.ground_camera.width, self.ground_camera.height
+        return (
+            read_colour(self.ground_colour_files[index], *size),
+            read_depth(self.ground_depth_files[index], *size, self.depth_units_per_m),
+        )
+
+    def check_present(self) -> None:
+        """Raises RecordingError naming the first file that is missing."""
+        for files in (self.mav_files, self.ground_colour_files, self.ground_depth_files):
+            present = {file for folder in {f.parent for f in files} for file in _listing(folder)}
+            for file in files:
+                if file not in present:
+                    raise RecordingError(f"{file}: this image is listed but missing")
+
+
+def _listing(folder: Path) -> list[Path]:
+    try:
+        return list(folder.iterdir())
+    except OSError as error:
+        raise RecordingError(f"{folder}: cannot be listed: {error.strerror}") from None

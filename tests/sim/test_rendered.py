@@ -1,0 +1,97 @@
+"""Images drawn while they are read are those that a recording would hold."""
+
+import multiprocessing
+from collections.abc import Iterator
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from airground.core.messages import Stamped
+from airground.errors import AirgroundError, InputError
+from airground.io.recording import Recording
+from sim import recorder
+from sim.presets import NOMINAL
+from sim.recorder import record
+from sim.rendered import Flight, rendered
+from sim.scene import parse_scene
+from sim.truth import Truth
+from tests.sim.small_flight import FRAMES, SCENE, few_stamps, plain_world
+
+FLIGHT = Flight(parse_scene(SCENE, "small.toml"), 3, 1, NOMINAL)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _small_recordings() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(recorder, "image_stamps", few_stamps)
+        patch.setattr(recorder, "build_world", plain_world)
+        yield
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("stored") / "recording"
+    return record(FLIGHT.scene, FLIGHT.seed, FLIGHT.sensors, out, workers=1, flight=FLIGHT.flight)
+
+
+def assert_same(one: Stamped, other: Stamped) -> None:
+    assert one.robot == other.robot
+    assert type(one.message) is type(other.message)
+    for field in fields(one.message):
+        a, b = (getattr(stamped.message, field.name) for stamped in (one, other))
+        np.testing.assert_array_equal(a, b)
+        assert np.asarray(a).dtype == np.asarray(b).dtype
+
+
+def test_all_is_as_if_recorded_and_read(stored: Path) -> None:
+    recording, truth = Recording.open(stored), Truth.open(stored)
+    with rendered(FLIGHT, workers=2) as drawn:
+        messages = list(recording.messages())
+        assert len(messages) == 2 * 3 * FRAMES
+        for one, other in zip(messages, drawn.messages(), strict=True):
+            assert_same(one, other)
+        told = recording.header.model_dump(exclude={"digests"})
+        assert drawn.header.model_dump(exclude={"digests"}) == told
+        drawn_truth = Truth.open(drawn.path)
+        stamp = int(recording.ground_camera_stamps[1])
+        np.testing.assert_array_equal(
+            drawn_truth.depth("ground", stamp), truth.depth("ground", stamp)
+        )
+        assert not list(drawn.path.rglob("*.png"))
+    assert not drawn.path.exists()
+    assert not multiprocessing.active_children()
+
+
+def test_images_come_in_any_order(stored: Path) -> None:
+    recording = Recording.open(stored)
+    with rendered(FLIGHT, workers=1) as drawn:
+        for index in (2, 0, 0, 1):
+            mav, ground = recording.read_mav_image(index), recording.read_ground_image(index)
+            np.testing.assert_array_equal(drawn.read_mav_image(index).image, mav.image)
+            np.testing.assert_array_equal(drawn.read_ground_image(index).depth, ground.depth)
+
+
+def read_all(recording: Recording) -> None:
+    for _ in recording.messages():
+        pass
+
+
+def test_a_dead_process_is_told() -> None:
+    with rendered(FLIGHT, workers=1) as drawn:
+        for child in multiprocessing.active_children():
+            child.kill()
+        with pytest.raises(AirgroundError, match="rendering process died"):
+            read_all(drawn)
+    assert not drawn.path.exists()
+
+
+def test_an_impossible_flight_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    short = FLIGHT.scene.model_copy(update={"duration_s": 0.5})
+    with pytest.raises(InputError, match="duration_s"), rendered(Flight(short, 3, 1, NOMINAL), 1):
+        pass
+    assert list(tmp_path.iterdir()) == []
