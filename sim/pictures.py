@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from concurrent.futures import ThreadPoolExecutor
 
 import mujoco
@@ -57,7 +58,7 @@ def paint_boxes(
     if not boxes:
         return []
     light = _face_light(boxes, baker)
-    with ThreadPoolExecutor(2) as pool:
+    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
         jobs = [
             pool.submit(_cube_picture, box, makes[box.make], light[i], own)
             for i, (box, own) in enumerate(zip(boxes, rng.spawn(len(boxes)), strict=True))

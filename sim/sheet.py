@@ -60,7 +60,7 @@ class Sheet:
         self.darken(1 + tone)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _multiply(pixels: NDArray, factor: NDArray) -> None:
     for i in range(pixels.shape[0]):
         for j in range(pixels.shape[1]):
@@ -69,7 +69,7 @@ def _multiply(pixels: NDArray, factor: NDArray) -> None:
                 pixels[i, j, c] *= f
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _blend(pixels: NDArray, colour: NDArray, cover: NDArray) -> None:
     for i in range(pixels.shape[0]):
         for j in range(pixels.shape[1]):
@@ -79,7 +79,7 @@ def _blend(pixels: NDArray, colour: NDArray, cover: NDArray) -> None:
                     pixels[i, j, c] += (colour[c] - pixels[i, j, c]) * f
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def light_up(pixels: NDArray, light: NDArray, out: NDArray) -> None:
     """Stretch a picture over `out`, multiply by the stretched light, round to bytes.
 
@@ -89,21 +89,54 @@ def light_up(pixels: NDArray, light: NDArray, out: NDArray) -> None:
         out: (R, C, 3) uint8, overwritten.
     """
     rows, columns = out.shape[:2]
+    # Rows of the two, stretched along x: the upper and the lower that a row of `out` is between.
+    shown, lit = np.empty((2, 3 * columns)), np.empty((2, 3 * columns))
+    shown_rows, lit_rows = np.full(2, -1), np.full(2, -1)
     for i in range(rows):
         y = (i + 0.5) / rows
-        y0, y1, fy = _between(y, pixels.shape[0])
-        v0, v1, fv = _between(y, light.shape[0])
-        for j in range(columns):
-            x = (j + 0.5) / columns
-            x0, x1, fx = _between(x, pixels.shape[1])
-            u0, u1, fu = _between(x, light.shape[1])
-            for c in range(3):
-                a = pixels[y0, x0, c] * (1 - fx) + pixels[y0, x1, c] * fx
-                b = pixels[y1, x0, c] * (1 - fx) + pixels[y1, x1, c] * fx
-                p = light[v0, u0, c] * (1 - fu) + light[v0, u1, c] * fu
-                q = light[v1, u0, c] * (1 - fu) + light[v1, u1, c] * fu
-                value = (a * (1 - fy) + b * fy) * (p * (1 - fv) + q * fv) + 0.5
-                out[i, j, c] = np.uint8(min(max(value, 0.0), 255.0))
+        fy = _rows_around(y, pixels, shown_rows, shown)
+        fv = _rows_around(y, light, lit_rows, lit)
+        _multiply_rows(shown[0], shown[1], fy, lit[0], lit[1], fv, out[i].reshape(-1))
+
+
+@njit(cache=True, error_model="numpy")
+def _multiply_rows(  # type: ignore[no-untyped-def]
+    shown_above, shown_below, fy, lit_above, lit_below, fv, out
+):
+    for k in range(len(out)):
+        shown = shown_above[k] * (1 - fy) + shown_below[k] * fy
+        lit = lit_above[k] * (1 - fv) + lit_below[k] * fv
+        out[k] = np.uint8(min(max(shown * lit + 0.5, 0.0), 255.0))
+
+
+@njit(cache=True, error_model="numpy")
+def _rows_around(y: float, image: NDArray, held: NDArray, stretched: NDArray) -> float:
+    """Have `stretched` hold the two rows around a relative height; returns the share of the lower.
+
+    Args:
+        y: From 0 at the top to 1.
+        image: (H, W, 3).
+        held: (2,) which rows `stretched` holds so far; kept up to date.
+        stretched: (2, 3 C) float64.
+    """
+    first, second, share = _between(y, image.shape[0])
+    if held[1] == first:
+        stretched[0] = stretched[1]
+        held[0] = first
+    for k, row in enumerate((first, second)):
+        if held[k] != row:
+            _stretch_row(image[row], stretched[k])
+            held[k] = row
+    return share
+
+
+@njit(cache=True, error_model="numpy")
+def _stretch_row(row: NDArray, out: NDArray) -> None:
+    columns = len(out) // 3
+    for j in range(columns):
+        first, second, share = _between((j + 0.5) / columns, len(row))
+        for c in range(3):
+            out[3 * j + c] = row[first, c] * (1 - share) + row[second, c] * share
 
 
 @njit(cache=True, error_model="numpy")
