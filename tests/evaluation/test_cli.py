@@ -91,6 +91,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
         (["simulate", "flat"], "--out"),
         (["doctor", "--threads", "0"], "--threads 0: must be at least 1"),
         (["reproduce", "--out", "x", "--poses", "file"], "'slam'"),
+        (["reproduce", "--out", "x", "--render", "--recordings", "y"], "--render"),
     ],
 )
 def test_wrong_words_get_one_line(
