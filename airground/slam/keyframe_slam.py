@@ -41,7 +41,7 @@ PATIENCE = 2
 GUIDED_LEVELS, UNGUIDED_LEVELS = 1, 3
 """Pyramid levels above the image: a gyro tells where corners go, constant motion guesses."""
 FIRST_GLOBAL_ADJUSTMENT = 8
-GLOBAL_ADJUSTMENT_GROWTH = 1.3
+GLOBAL_ADJUSTMENT_GROWTH = 1.5
 """The whole map is adjusted at so many keyframes, and whenever it has grown by this factor: what
 the beginning got wrong shows only later, and would bend all that stands on it."""
 
