@@ -15,6 +15,7 @@ from airground.config import KeyframeSlam as Parameters
 from airground.core.messages import ImuSamples, RobotCalibration
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
+from airground.slam.culling import KeyframeCuller
 from airground.slam.depth_lookup import inverse_depths_at
 from airground.slam.doubt import Doubt, jumps, surprising
 from airground.slam.expected_pixels import expected_pixels
@@ -44,6 +45,9 @@ FIRST_GLOBAL_ADJUSTMENT = 8
 GLOBAL_ADJUSTMENT_GROWTH = 1.5
 """The whole map is adjusted at so many keyframes, and whenever it has grown by this factor: what
 the beginning got wrong shows only later, and would bend all that stands on it."""
+MOST_BETWEEN_GLOBAL = 200
+"""No later than after so many new keyframes it is adjusted again: then the old ones are settled,
+and may be culled with their inertial motions."""
 
 
 class KeyframeSlam:
@@ -108,6 +112,7 @@ class KeyframeSlam:
             self.map, self.tracker, self.adjuster, self._recovery, *own, self._max_depth_m
         )
         self._choice = KeyframeChoice(self.map, *own)
+        self._culler = KeyframeCuller(self.map, self.adjuster, self._recovery, self.path, *own)
 
     def add_imu(self, samples: ImuSamples) -> None:
         self.motion.add(samples)
@@ -340,8 +345,13 @@ class KeyframeSlam:
         closed = not self._mapper.found_old and self._loops.close(frame.depth, self.inertial)
         if closed:
             self._follow_newest(before)
-        if len(self.map.keyframes) < self._next_global:
+        # Until poses are given out, scale and vertical are sought by all keyframes.
+        if len(self.path):
+            self._culler.cull()
+        self.motion.forget_before(self.map.keyframes[-1].stamp_ns)
+        if self.map.made < self._next_global:
             return closed
-        self._next_global = int(GLOBAL_ADJUSTMENT_GROWTH * self._next_global)
+        growth = int(GLOBAL_ADJUSTMENT_GROWTH * self._next_global)
+        self._next_global = min(growth, self._next_global + MOST_BETWEEN_GLOBAL)
         self.adjust_all()
         return True
