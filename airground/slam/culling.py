@@ -57,33 +57,32 @@ class KeyframeCuller:
         self._parameters = parameters
         self._next = 1
 
-    def cull(self) -> int:
+    def cull(self, inertial: bool) -> None:
         """Judge the keyframe that just left the window and, in turn, one of the older ones.
 
-        Returns:
-            How many were taken out.
+        Args:
+            inertial: Whether the map is metric and gravity-aligned by the accelerometer.
         """
-        made = len(self._map.keyframes)
         # One keyframe stays beside the window: inertial motion leads from it.
-        left = made - self._parameters.window - 2
-        if left < 1:
-            return 0
-        self._judge(left)
-        if self._next >= left:
-            self._next = 1
-        if not self._judge(self._next):
-            self._next += 1
-        return made - len(self._map.keyframes)
+        left = len(self._map.keyframes) - self._parameters.window - 2
+        if left >= 1:
+            self._judge(left, inertial)
+        if left >= 2:
+            self._next = self._next if self._next < left else 1
+            if not self._judge(self._next, inertial):
+                self._next += 1
 
-    def _judge(self, keyframe: int) -> bool:
+    def _judge(self, keyframe: int, inertial: bool) -> bool:
         """Take a keyframe out if it may go; returns whether it did."""
-        if not self._adjuster.can_skip(keyframe) or not self.covered(keyframe):
+        if inertial and not self._adjuster.can_skip(keyframe):
+            return False
+        if not self.covered(keyframe):
             return False
         keyframes = self._map.keyframes
         before, gone, after = keyframes[keyframe - 1 : keyframe + 2]
         sooner = gone.stamp_ns - before.stamp_ns <= after.stamp_ns - gone.stamp_ns
         self._path.rehang(gone, before if sooner else after)
-        self._adjuster.skip(keyframe)
+        self._adjuster.skip(keyframe, inertial)
         self._recovery.forget(gone.stamp_ns)
         self._map.cull(keyframe)
         return True

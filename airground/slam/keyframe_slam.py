@@ -347,7 +347,7 @@ class KeyframeSlam:
             self._follow_newest(before)
         # Until poses are given out, scale and vertical are sought by all keyframes.
         if len(self.path):
-            self._culler.cull()
+            self._culler.cull(self.inertial)
         self.motion.forget_before(self.map.keyframes[-1].stamp_ns)
         if self.map.made < self._next_global:
             return closed

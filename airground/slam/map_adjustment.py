@@ -121,10 +121,11 @@ class MapAdjuster:
             return before is after
         return before.duration_s + after.duration_s <= MAX_JOINED_S
 
-    def skip(self, keyframe: int) -> None:
+    def skip(self, keyframe: int, inertial: bool) -> None:
         """Join the motions before and after a keyframe that is about to be culled.
 
-        Where they are too long or not known on both sides, they go, and their other ends hold.
+        Where they are too long or not known on both sides they go. Their other ends hold from
+        then on if inertia counts (`inertial`).
         """
         before, after = self.motions.pop(keyframe, None), self.motions.pop(keyframe + 1, None)
         self.motions = {k if k < keyframe else k - 1: m for k, m in self.motions.items()}
@@ -136,7 +137,7 @@ class MapAdjuster:
                 self.motions[keyframe] = joined
                 return
         for neighbour in (keyframe - 1, keyframe + 1):
-            self._map.keyframes[neighbour].held = True
+            self._map.keyframes[neighbour].held = inertial
 
     def _holding(self, free: list[int]) -> list[int]:
         """Older keyframes that share the most points with the free ones, in order of time.
