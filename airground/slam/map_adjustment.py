@@ -137,7 +137,7 @@ class MapAdjuster:
                 self.motions[keyframe] = joined
                 return
         for neighbour in (keyframe - 1, keyframe + 1):
-            self._map.keyframes[neighbour].held = inertial
+            self._map.keyframes[neighbour].held |= inertial
 
     def _holding(self, free: list[int]) -> list[int]:
         """Older keyframes that share the most points with the free ones, in order of time.
