@@ -41,13 +41,6 @@ PATIENCE = 2
 """A point that fits the pose badly in this many images in a row is given up."""
 GUIDED_LEVELS, UNGUIDED_LEVELS = 1, 3
 """Pyramid levels above the image: a gyro tells where corners go, constant motion guesses."""
-FIRST_GLOBAL_ADJUSTMENT = 8
-GLOBAL_ADJUSTMENT_GROWTH = 1.5
-"""The whole map is adjusted at so many keyframes, and whenever it has grown by this factor: what
-the beginning got wrong shows only later, and would bend all that stands on it."""
-MOST_BETWEEN_GLOBAL = 200
-"""No later than after so many new keyframes it is adjusted again: then the old ones are settled,
-and may be culled with their inertial motions."""
 
 
 class KeyframeSlam:
@@ -99,7 +92,6 @@ class KeyframeSlam:
         self.stamp_ns: int | None = None
         self._turn = np.eye(3)
         self._seen_ns = 0
-        self._next_global = FIRST_GLOBAL_ADJUSTMENT
         self._keyframe_covariance = np.zeros((6, 6))
         self._doubt: Doubt | None = None
         self._torn = False
@@ -349,9 +341,7 @@ class KeyframeSlam:
         if len(self.path):
             self._culler.cull(self.inertial)
         self.motion.forget_before(self.map.keyframes[-1].stamp_ns)
-        if self.map.made < self._next_global:
+        if not self.adjuster.all_due():
             return closed
-        growth = int(GLOBAL_ADJUSTMENT_GROWTH * self._next_global)
-        self._next_global = min(growth, self._next_global + MOST_BETWEEN_GLOBAL)
         self.adjust_all()
         return True

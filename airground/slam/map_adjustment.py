@@ -31,6 +31,13 @@ WINDOW_DECREASE, GLOBAL_DECREASE = 1e-5, 1e-6
 """Adjustment ends when a step lowers the cost by less than this share. The scale of a whole map
 moves far for little cost."""
 
+FIRST_ALL = 8
+ALL_GROWTH = 1.5
+"""The whole map is adjusted at so many keyframes, and whenever it has grown by this factor: what
+the beginning got wrong shows only later, and would bend all that stands on it."""
+MOST_BETWEEN_ALL = 200
+"""No later than after so many new keyframes it is adjusted again: then the old ones are settled,
+and may be culled with their inertial motions."""
 SETTLING_NS = 60_000_000_000
 """After so much flight the scale of what is older is known to the per mille."""
 MAX_JOINED_S = 3.0
@@ -64,6 +71,7 @@ class MapAdjuster:
     ) -> None:
         self.motions: dict[int, Preintegration] = {}
         self.settled_ns = np.iinfo(np.int64).min
+        self._next_all = FIRST_ALL
         self._map = sparse_map
         self._camera = camera
         self._T_rig_camera = T_rig_camera
@@ -111,6 +119,14 @@ class MapAdjuster:
         self.settled_ns = keyframes[-1].stamp_ns - SETTLING_NS
         settings = Settings(GLOBAL_ITERATIONS, relative_decrease=GLOBAL_DECREASE)
         return self._adjust(list(range(count)), roles, inertial, settings)
+
+    def all_due(self) -> bool:
+        """Whether the newest keyframe makes it time to adjust the whole map; to be asked once."""
+        due = self._map.made >= self._next_all
+        if due:
+            grown = int(ALL_GROWTH * self._next_all)
+            self._next_all = min(grown, self._next_all + MOST_BETWEEN_ALL)
+        return due
 
     def can_skip(self, keyframe: int) -> bool:
         """Whether a keyframe may go without a loss of what inertia tells."""

@@ -282,3 +282,18 @@ def test_where_inertia_does_not_count_no_keyframe_is_held() -> None:
     sparse_map.cull(2)
     assert sorted(adjuster.motions) == [1, 3]
     assert not any(keyframe.held for keyframe in sparse_map.keyframes)
+
+
+def test_the_whole_map_is_adjusted_less_and_less_often_but_never_seldom() -> None:
+    problem = bundle_problems.make(2, 100, 50)
+    sparse_map = map_of(problem)
+    adjuster = adjuster_of(sparse_map, problem)
+    due = []
+    for made in range(2, 2000):
+        sparse_map.culled = made - 2  # all but two were culled: made counts
+        if adjuster.all_due():
+            due.append(made)
+    assert due[0] == map_adjustment.FIRST_ALL
+    steps = np.diff(due)
+    assert (np.diff(steps) >= 0).all()
+    assert steps[-1] == map_adjustment.MOST_BETWEEN_ALL
