@@ -108,7 +108,10 @@ class SE3:
     def __matmul__(self, other: SE3 | NDArray) -> SE3 | NDArray:
         """Compose with a motion, or move points of shape (3,) or (N, 3)."""
         if isinstance(other, SE3):
-            rotation = nearest_rotation(self.rotation @ other.rotation)
+            rotation = self.rotation @ other.rotation
+            # One Newton step toward the nearest rotation keeps long chains orthonormal: the
+            # error of a product is all but nothing already, and is squared by it.
+            rotation = rotation @ (1.5 * np.eye(3) - 0.5 * rotation.T @ rotation)
             return SE3(rotation, self.rotation @ other.translation + self.translation)
         return other @ self.rotation.T + self.translation
 
@@ -134,7 +137,7 @@ def interpolate(start: SE3, end: SE3, fraction: float) -> SE3:
 
 
 def nearest_rotation(matrix: NDArray) -> NDArray[np.float64]:
-    """The rotation closest to `matrix`; keeps long chains of products orthonormal."""
+    """The rotation closest to `matrix`."""
     u, _, vt = np.linalg.svd(matrix)
     if np.linalg.det(u @ vt) < 0:
         u[:, 2] *= -1

@@ -15,6 +15,7 @@ from airground.config import KeyframeSlam as Parameters
 from airground.core.messages import ImuSamples, RobotCalibration
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
+from airground.slam.culling import KeyframeCuller
 from airground.slam.depth_lookup import inverse_depths_at
 from airground.slam.doubt import Doubt, jumps, surprising
 from airground.slam.expected_pixels import expected_pixels
@@ -40,10 +41,6 @@ PATIENCE = 2
 """A point that fits the pose badly in this many images in a row is given up."""
 GUIDED_LEVELS, UNGUIDED_LEVELS = 1, 3
 """Pyramid levels above the image: a gyro tells where corners go, constant motion guesses."""
-FIRST_GLOBAL_ADJUSTMENT = 8
-GLOBAL_ADJUSTMENT_GROWTH = 1.3
-"""The whole map is adjusted at so many keyframes, and whenever it has grown by this factor: what
-the beginning got wrong shows only later, and would bend all that stands on it."""
 
 
 class KeyframeSlam:
@@ -95,7 +92,6 @@ class KeyframeSlam:
         self.stamp_ns: int | None = None
         self._turn = np.eye(3)
         self._seen_ns = 0
-        self._next_global = FIRST_GLOBAL_ADJUSTMENT
         self._keyframe_covariance = np.zeros((6, 6))
         self._doubt: Doubt | None = None
         self._torn = False
@@ -108,6 +104,7 @@ class KeyframeSlam:
             self.map, self.tracker, self.adjuster, self._recovery, *own, self._max_depth_m
         )
         self._choice = KeyframeChoice(self.map, *own)
+        self._culler = KeyframeCuller(self.map, self.adjuster, self._recovery, self.path, *own)
 
     def add_imu(self, samples: ImuSamples) -> None:
         self.motion.add(samples)
@@ -340,8 +337,11 @@ class KeyframeSlam:
         closed = not self._mapper.found_old and self._loops.close(frame.depth, self.inertial)
         if closed:
             self._follow_newest(before)
-        if len(self.map.keyframes) < self._next_global:
+        # Until poses are given out, scale and vertical are sought by all keyframes.
+        if len(self.path):
+            self._culler.cull(self.inertial)
+        self.motion.forget_before(self.map.keyframes[-1].stamp_ns)
+        if not self.adjuster.all_due():
             return closed
-        self._next_global = int(GLOBAL_ADJUSTMENT_GROWTH * self._next_global)
         self.adjust_all()
         return True

@@ -19,6 +19,7 @@ from airground.slam.bundle_adjustment import (
     States,
     adjust,
 )
+from airground.slam.inertial.joining import join
 from airground.slam.inertial.preintegration import Preintegration
 from airground.slam.rig_state import RigState
 from airground.slam.sparse_map import SparseMap
@@ -29,6 +30,19 @@ GLOBAL_ITERATIONS = 15
 WINDOW_DECREASE, GLOBAL_DECREASE = 1e-5, 1e-6
 """Adjustment ends when a step lowers the cost by less than this share. The scale of a whole map
 moves far for little cost."""
+
+FIRST_ALL = 8
+ALL_GROWTH = 1.5
+"""The whole map is adjusted at so many keyframes, and whenever it has grown by this factor: what
+the beginning got wrong shows only later, and would bend all that stands on it."""
+MOST_BETWEEN_ALL = 200
+"""No later than after so many new keyframes it is adjusted again: then the old ones are settled,
+and may be culled with their inertial motions."""
+SETTLING_NS = 60_000_000_000
+"""After so much flight the scale of what is older is known to the per mille."""
+MAX_JOINED_S = 3.0
+"""Longer than this, the bias of an accelerometer does not stay what it was (the same limit as in
+Campos et al., "ORB-SLAM3", T-RO 2021)."""
 
 
 class MapAdjuster:
@@ -43,6 +57,8 @@ class MapAdjuster:
 
     Attributes:
         motions: By keyframe, the inertial motion since the one before, where known.
+        settled_ns: Keyframes up to this stamp took part in adjusting the whole map long after
+            they were made, and hold what their inertial motions had to tell.
     """
 
     def __init__(
@@ -54,6 +70,8 @@ class MapAdjuster:
         inverse_depth_sigma: float,
     ) -> None:
         self.motions: dict[int, Preintegration] = {}
+        self.settled_ns = np.iinfo(np.int64).min
+        self._next_all = FIRST_ALL
         self._map = sparse_map
         self._camera = camera
         self._T_rig_camera = T_rig_camera
@@ -87,16 +105,55 @@ class MapAdjuster:
 
         With an IMU, place and heading of the newest keyframe stay, so that a better vertical
         turns the past about the robot instead of moving the robot about the past. Without,
-        the first keyframe stays, since only there it is known where up is.
+        the first keyframe stays, since only there it is known where up is. Keyframes that
+        culling left without their inertial motion stay in either case.
         """
-        count = len(self._map.keyframes)
+        keyframes = self._map.keyframes
+        count = len(keyframes)
         roles = np.full(count, Role.FREE)
-        if inertial:
-            roles[-1] = Role.GAUGE
-        else:
+        roles[[keyframe.held for keyframe in keyframes]] = Role.FIXED
+        if not inertial:
             roles[0] = Role.FIXED
+        elif not (roles == Role.FIXED).any():
+            roles[-1] = Role.GAUGE
+        self.settled_ns = keyframes[-1].stamp_ns - SETTLING_NS
         settings = Settings(GLOBAL_ITERATIONS, relative_decrease=GLOBAL_DECREASE)
         return self._adjust(list(range(count)), roles, inertial, settings)
+
+    def all_due(self) -> bool:
+        """Whether the newest keyframe makes it time to adjust the whole map; to be asked once."""
+        due = self._map.made >= self._next_all
+        if due:
+            grown = int(ALL_GROWTH * self._next_all)
+            self._next_all = min(grown, self._next_all + MOST_BETWEEN_ALL)
+        return due
+
+    def can_skip(self, keyframe: int) -> bool:
+        """Whether a keyframe may go without a loss of what inertia tells."""
+        if self._map.keyframes[keyframe + 1].stamp_ns <= self.settled_ns:
+            return True
+        before, after = self.motions.get(keyframe), self.motions.get(keyframe + 1)
+        if before is None or after is None:
+            return before is after
+        return before.duration_s + after.duration_s <= MAX_JOINED_S
+
+    def skip(self, keyframe: int, inertial: bool) -> None:
+        """Join the motions before and after a keyframe that is about to be culled.
+
+        Where they are too long or not known on both sides they go. Their other ends hold from
+        then on if inertia counts (`inertial`).
+        """
+        before, after = self.motions.pop(keyframe, None), self.motions.pop(keyframe + 1, None)
+        self.motions = {k if k < keyframe else k - 1: m for k, m in self.motions.items()}
+        if before is None and after is None:
+            return
+        if before is not None and after is not None:
+            joined = join(before, after)
+            if joined.duration_s <= MAX_JOINED_S:
+                self.motions[keyframe] = joined
+                return
+        for neighbour in (keyframe - 1, keyframe + 1):
+            self._map.keyframes[neighbour].held |= inertial
 
     def _holding(self, free: list[int]) -> list[int]:
         """Older keyframes that share the most points with the free ones, in order of time.

@@ -14,6 +14,9 @@ from airground.slam.rig_state import RigState
 
 MAX_GAP_S = 0.04
 """Inertial samples farther apart than this have a hole between them: a robot shakes faster."""
+KEPT_NS = 1_000_000_000
+"""Samples from before the last keyframe that are kept: the vertical is looked for in them when a
+map begins anew [ns]."""
 MAX_COAST_S = 3.0
 """For this long a robot is believed to go on without a look at the scene. Inertial dead
 reckoning drifts by centimetres meanwhile; others may have stopped or turned off."""
@@ -51,6 +54,11 @@ class MotionModel:
     def add(self, samples: ImuSamples) -> None:
         if self.buffer is not None:
             self.buffer.add(samples)
+
+    def forget_before(self, stamp_ns: int) -> None:
+        """Drop inertial samples from long before an image."""
+        if self.buffer is not None:
+            self.buffer.forget_before(self.imu_time(stamp_ns) - KEPT_NS)
 
     def imu_time(self, stamp_ns: int) -> int:
         """A stamp of the camera on the IMU's clock [ns]."""

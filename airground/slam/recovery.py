@@ -68,9 +68,12 @@ class Recovery:
 
     def add_keyframe(self) -> None:
         """Make the newest keyframe known."""
-        number = len(self._map.keyframes) - 1
-        keyframe = self._map.keyframes[number]
-        self._index.add(number, keyframe.image, keyframe.ids, keyframe.pixels)
+        keyframe = self._map.keyframes[-1]
+        self._index.add(keyframe.stamp_ns, keyframe.image, keyframe.ids, keyframe.pixels)
+
+    def forget(self, stamp_ns: int) -> None:
+        """Do not look for the keyframe of that stamp any more."""
+        self._index.remove(stamp_ns)
 
     def near(
         self,
@@ -114,11 +117,12 @@ class Recovery:
             among: The old keyframes.
             without: Numbers of points that do not count.
         """
-        newest = len(self._map.keyframes) - 1
-        alike = self._index.resembling(newest, among)
+        newest = self._map.keyframes[-1]
+        stamps = [self._map.keyframes[k].stamp_ns for k in among]
+        alike = self._index.resembling(newest.stamp_ns, stamps)
         if not alike:
             return None
-        image = self._map.keyframes[newest].image
+        image = newest.image
         found = self._index.find(image, self._camera, self._places, alike)
         if found is None:
             return None

@@ -29,6 +29,8 @@ class Keyframe:
         pixels: (n, 2) float64 where.
         inverse_depths: (n,) [1/m], measured by a depth camera; NaN where it was not.
         still: Whether the robot was at rest.
+        held: Whether a neighbour was culled with its inertial motion. What that told of scale
+            and vertical is in the poses by then, and adjusting the whole map must not lose it.
     """
 
     stamp_ns: int
@@ -38,6 +40,7 @@ class Keyframe:
     pixels: NDArray[np.float64]
     inverse_depths: NDArray[np.float64]
     still: bool = False
+    held: bool = False
 
     def see(self, ids: NDArray, pixels: NDArray, inverse_depths: NDArray) -> None:
         """Add observations of points that this keyframe does not have yet."""
@@ -56,7 +59,8 @@ class SparseMap:
     """Keyframes in order of time, and points by their number.
 
     Attributes:
-        keyframes: All of them.
+        keyframes: All that were not culled.
+        culled: How many were.
         positions: (capacity, 3) of the points in the map [m]; only those MAPPED count.
         states: (capacity,) CANDIDATE, MAPPED or DROPPED.
         origins: (capacity,) index of the keyframe in which a point was first seen ...
@@ -65,6 +69,7 @@ class SparseMap:
 
     def __init__(self) -> None:
         self.keyframes: list[Keyframe] = []
+        self.culled = 0
         self.positions = np.zeros((FIRST_POINTS, 3))
         self.states = np.zeros(FIRST_POINTS, np.int8)
         self.origins = np.zeros(FIRST_POINTS, np.int64)
@@ -74,6 +79,11 @@ class SparseMap:
     def __len__(self) -> int:
         """Points that were ever made."""
         return self._count
+
+    @property
+    def made(self) -> int:
+        """Keyframes that were ever made."""
+        return len(self.keyframes) + self.culled
 
     def new_points(self, pixels: NDArray, origin: int) -> NDArray[np.int64]:
         """Numbers of new candidates, first seen at (n, 2) pixels of keyframe `origin`."""
@@ -103,6 +113,30 @@ class SparseMap:
     def drop(self, ids: NDArray[np.int64]) -> None:
         """Take points out for good."""
         self.states[ids] = DROPPED
+
+    def cull(self, keyframe: int) -> None:
+        """Take a keyframe out; not the first.
+
+        Candidates that were first seen in it begin in the next keyframe that saw them. A point
+        that fewer than two others saw goes with it.
+        """
+        gone = self.keyframes.pop(keyframe)
+        self.culled += 1
+        # What was first seen in the culled keyframe counts as old as the one before it.
+        origins = self.origins[: self._count]
+        begun_here = gone.ids[(self.origins[gone.ids] == keyframe)]
+        origins[origins >= keyframe] -= 1
+        views = np.zeros(len(self.states), np.int64)
+        waiting = begun_here[self.states[begun_here] == CANDIDATE]
+        for index, other in enumerate(self.keyframes):
+            views[other.ids] += 1
+            if index >= keyframe and len(waiting):
+                again, _, rows = np.intersect1d(waiting, other.ids, return_indices=True)
+                self.origins[again], self.first_pixels[again] = index, other.pixels[rows]
+                waiting = np.setdiff1d(waiting, again)
+        self.drop(waiting)
+        mapped = gone.ids[self.mapped(gone.ids)]
+        self.drop(mapped[views[mapped] < 2])
 
     def seen_by(self, keyframes: list[int]) -> NDArray[np.int64]:
         """Numbers of all points in the map that one of the keyframes saw, sorted."""

@@ -26,6 +26,9 @@ START_LEVELS = 3
 MIN_CORNERS = 60
 MIN_LEFT = 0.5
 """With fewer of its corners left than this share, another first view is chosen."""
+MOST_PASSED_OVER = 5
+"""Where images show hardly a corner, one after the other, as on the floor before take-off, more
+and more of them are passed over before corners are sought again, up to so many."""
 GYRO_START_SIGMA = 0.01
 """A gyro's unknown bias turns this far in a second [rad]."""
 LEVEL_WINDOW_NS = 200_000_000
@@ -126,9 +129,13 @@ class TwoViewWait:
         self._rng = rng
         self._first: Frame | None = None
         self._corners = np.empty((0, 2), np.float32)
+        self._blind = self._pass_over = 0
 
     def observe(self, frame: Frame, motion: MotionModel) -> MovingStart | None:
         """Take in the next image; the start, once there is one."""
+        if self._pass_over:
+            self._pass_over -= 1
+            return None
         self._tracker.advance(frame.image, self._tracker.pixels)
         few = len(self._tracker.ids) < MIN_LEFT * max(len(self._corners), MIN_CORNERS)
         if self._first is None or few:
@@ -163,6 +170,9 @@ class TwoViewWait:
         )
         self._tracker.add(np.arange(len(self._corners)), self._corners)
         self._first = frame
+        blind = len(self._corners) < MIN_LEFT * MIN_CORNERS
+        self._blind = self._blind + 1 if blind else 0
+        self._pass_over = min(max(self._blind - 1, 0), MOST_PASSED_OVER)
 
     def _turn(self, motion: MotionModel, first: Frame, second: Frame) -> NDArray[np.float64] | None:
         """(3, 3) turn of the rig between two images, by the gyro."""

@@ -57,7 +57,7 @@ class TightScale:
             tracked: Whether the newest image gave a pose; here only keyframes matter.
         """
         slam = self._slam
-        count = len(slam.map.keyframes)
+        count = slam.map.made
         if slam.motion.buffer is None:
             self.estimate = ScaleEstimate(np.inf, observable=False)
             return False

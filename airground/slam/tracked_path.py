@@ -4,35 +4,78 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.slam.sparse_map import Keyframe
 
+FIRST_IMAGES = 1024
+
 
 class TrackedPath:
-    """Every image whose pose was given out, in order of time."""
+    """Every image whose pose was given out, in order of time.
+
+    Keyframes are known by their stamps. One that is culled hands its images on to another.
+    """
 
     def __init__(self) -> None:
-        self._hung: list[tuple[int, int, SE3]] = []
+        self.clear()
 
     def __len__(self) -> int:
-        return len(self._hung)
+        return self._count
 
     def clear(self) -> None:
         """Give up all images."""
-        self._hung.clear()
+        self._count = 0
+        self._stamps = np.empty((FIRST_IMAGES, 2), np.int64)
+        self._poses = np.empty((FIRST_IMAGES, 3, 4))
+        self._carried: dict[int, tuple[int, SE3]] = {}
 
     def note(self, stamp_ns: int, T_map_camera: SE3, keyframes: Sequence[Keyframe]) -> None:
         """Remember an image's pose relative to the newest keyframe."""
-        index = len(keyframes) - 1
-        T_keyframe_map = keyframes[index].state.pose().inverse()
-        self._hung.append((stamp_ns, index, T_keyframe_map @ T_map_camera))
+        newest = keyframes[-1]
+        if self._count == len(self._stamps):
+            self._stamps = np.concatenate([self._stamps, np.empty_like(self._stamps)])
+            self._poses = np.concatenate([self._poses, np.empty_like(self._poses)])
+        relative = newest.state.pose().inverse() @ T_map_camera
+        self._stamps[self._count] = stamp_ns, newest.stamp_ns
+        self._poses[self._count, :, :3] = relative.rotation
+        self._poses[self._count, :, 3] = relative.translation
+        self._count += 1
+
+    def rehang(self, culled: Keyframe, onto: Keyframe) -> None:
+        """Images that hang on a keyframe hang on another from now on."""
+        relative = onto.state.pose().inverse() @ culled.state.pose()
+        self._carried[culled.stamp_ns] = onto.stamp_ns, relative
 
     def trajectory(self, keyframes: Sequence[Keyframe]) -> Trajectory | None:
         """`T_map_camera` where the keyframes are now; None before the first image."""
-        if not self._hung:
+        if not self._count:
             return None
-        poses = [keyframe.state.pose() for keyframe in keyframes]
-        return Trajectory.from_poses(
-            [stamp for stamp, _, _ in self._hung], [poses[k] @ T for _, k, T in self._hung]
+        stamps, relative = self._stamps[: self._count], self._poses[: self._count]
+        hung_on, row_of = np.unique(stamps[:, 1], return_inverse=True)
+        rotations, positions = self._where(hung_on.tolist(), keyframes)
+        return Trajectory(
+            stamps[:, 0].copy(),
+            rotations[row_of] @ relative[:, :, :3],
+            np.einsum("nij,nj->ni", rotations[row_of], relative[:, :, 3]) + positions[row_of],
+        )
+
+    def _where(
+        self, stamps: list[int], keyframes: Sequence[Keyframe]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(n, 3, 3) and (n, 3) `T_map_rig` of keyframes by their stamps, culled or not."""
+        poses = {keyframe.stamp_ns: keyframe.state.pose() for keyframe in keyframes}
+        for stamp in stamps:
+            chain = [stamp]
+            while chain[-1] not in poses:
+                chain.append(self._carried[chain[-1]][0])
+            for one in reversed(chain[:-1]):
+                onto, relative = self._carried[one]
+                poses[one] = poses[onto] @ relative
+        return (
+            np.array([poses[stamp].rotation for stamp in stamps]),
+            np.array([poses[stamp].translation for stamp in stamps]),
         )

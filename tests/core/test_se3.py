@@ -99,3 +99,11 @@ def test_is_read_only() -> None:
 
 def test_nearest_rotation_repairs_a_reflection() -> None:
     assert np.linalg.det(nearest_rotation(np.diag([1.0, 1.0, -1.0]))) == pytest.approx(1.0)
+
+
+def test_long_chains_of_products_stay_orthonormal() -> None:
+    step = SE3.from_rotation_vector((0.3, -0.2, 0.9), (0.0, 0.1, 0.0))
+    chain = SE3(step.rotation + 1e-7, step.translation)
+    for _ in range(2000):
+        chain = chain @ step
+    assert np.abs(chain.rotation @ chain.rotation.T - np.eye(3)).max() < 1e-14

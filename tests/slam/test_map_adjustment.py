@@ -223,3 +223,77 @@ def test_motion_across_a_missing_keyframe_does_not_count() -> None:
     assert (2, 3) in pairs
     assert (4, 5) not in pairs
     assert (5, 6) in pairs
+
+
+def test_motions_around_a_skipped_keyframe_are_joined() -> None:
+    problem = bundle_problems.make(5, 200, 80)
+    sparse_map = map_of(problem)
+    adjuster = adjuster_of(sparse_map, problem)
+    motions = dict(adjuster.motions)
+    assert adjuster.can_skip(2)
+    adjuster.skip(2, inertial=True)
+    sparse_map.cull(2)
+    assert sorted(adjuster.motions) == [1, 2, 3]
+    assert adjuster.motions[1] is motions[1]
+    assert adjuster.motions[3] is motions[4]
+    both = motions[2].duration_s + motions[3].duration_s
+    assert adjuster.motions[2].duration_s == pytest.approx(both)
+    assert not any(keyframe.held for keyframe in sparse_map.keyframes)
+    # The joined motion leads where the two led.
+    first, last = (sparse_map.keyframes[k].state for k in (1, 2))
+    _, position, _ = adjuster.motions[2].predict(
+        first.rotation, first.position, first.velocity, first.gyro_bias, first.accelerometer_bias
+    )
+    np.testing.assert_allclose(position, last.position, atol=0.02)
+
+
+def test_a_motion_that_would_grow_too_long_goes_only_when_settled(
+    monkeypatch: pytest.MonkeyPatch, chosen: list
+) -> None:
+    problem = bundle_problems.make(6, 200, 80)
+    sparse_map = map_of(problem)
+    adjuster = adjuster_of(sparse_map, problem)
+    monkeypatch.setattr(map_adjustment, "MAX_JOINED_S", 1.5 * adjuster.motions[2].duration_s)
+    assert not adjuster.can_skip(2)
+    # Adjusting the whole map long after they were made settles keyframes 0 to 3.
+    monkeypatch.setattr(map_adjustment, "SETTLING_NS", 2)
+    adjuster.adjust_all(True)
+    assert [adjuster.can_skip(k) for k in range(1, 5)] == [True, True, False, False]
+    adjuster.skip(2, inertial=True)
+    sparse_map.cull(2)
+    assert [keyframe.held for keyframe in sparse_map.keyframes] == [False, True, True, False, False]
+    assert sorted(adjuster.motions) == [1, 3, 4]
+    before = [keyframe.state.position for keyframe in sparse_map.keyframes]
+    shaken(sparse_map, [0, 3, 4])
+    adjuster.adjust_all(True)
+    assert chosen[-1][1] == [Role.FREE, Role.FIXED, Role.FIXED, Role.FREE, Role.FREE]
+    after = [keyframe.state.position for keyframe in sparse_map.keyframes]
+    np.testing.assert_array_equal(after[1:3], before[1:3])
+    np.testing.assert_allclose(after, before, atol=0.01)
+
+
+def test_where_inertia_does_not_count_no_keyframe_is_held() -> None:
+    problem = bundle_problems.make(5, 200, 80)
+    sparse_map = map_of(problem)
+    adjuster = adjuster_of(sparse_map, problem)
+    del adjuster.motions[2]
+    assert not adjuster.can_skip(2)
+    adjuster.skip(2, inertial=False)
+    sparse_map.cull(2)
+    assert sorted(adjuster.motions) == [1, 3]
+    assert not any(keyframe.held for keyframe in sparse_map.keyframes)
+
+
+def test_the_whole_map_is_adjusted_less_and_less_often_but_never_seldom() -> None:
+    problem = bundle_problems.make(2, 100, 50)
+    sparse_map = map_of(problem)
+    adjuster = adjuster_of(sparse_map, problem)
+    due = []
+    for made in range(2, 2000):
+        sparse_map.culled = made - 2  # all but two were culled: made counts
+        if adjuster.all_due():
+            due.append(made)
+    assert due[0] == map_adjustment.FIRST_ALL
+    steps = np.diff(due)
+    assert (np.diff(steps) >= 0).all()
+    assert steps[-1] == map_adjustment.MOST_BETWEEN_ALL

@@ -110,3 +110,18 @@ def test_samples_that_are_not_finite_are_a_hole() -> None:
     t = read.stamps_ns * 1e-9 - 1.0
     gyro = np.where(((t > 1.02) & (t < 1.08))[:, None], np.nan, read.gyro)
     assert not predict(model(ImuSamples(read.stamps_ns, gyro, read.accelerometer))).inertial
+
+
+def test_samples_from_long_ago_are_forgotten_and_the_motion_stays() -> None:
+    motion, whole = model(samples()), model(samples())
+    start, end = (int(s) for s in to_ns(np.array([1.5, 1.7])))
+    assert motion.buffer is not None
+    motion.forget_before(start)
+    # 2 s at 200 Hz were there; what is left begins a second before.
+    assert 300 <= len(motion.buffer) <= 302
+    state = truth(1.5)
+    kept, all_of = (m.preintegrate(start, end, state) for m in (motion, whole))
+    assert kept is not None
+    assert all_of is not None
+    np.testing.assert_array_equal(kept.position, all_of.position)
+    assert motion.preintegrate(*(int(s) for s in to_ns(np.array([0.1, 0.2]))), state) is None

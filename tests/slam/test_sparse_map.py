@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from airground.core.se3 import SE3
 from airground.slam import so3
 from airground.slam.rig_state import RigState
-from airground.slam.sparse_map import CANDIDATE, FIRST_POINTS, Keyframe, SparseMap
+from airground.slam.sparse_map import CANDIDATE, DROPPED, FIRST_POINTS, Keyframe, SparseMap
 from tests.slam.views import CAMERA
 
 LEVER = np.array([0.05, -0.02, -0.03])
@@ -116,3 +116,37 @@ def test_a_keyframe_forgets_and_sees_whole_observations() -> None:
     frame.see(np.array([9]), np.array([[9.0, 0.0]]), np.array([0.5]))
     assert frame.ids.tolist() == frame.pixels[:, 0].tolist() == [4, 6, 9]
     np.testing.assert_array_equal(frame.inverse_depths, [np.nan, np.nan, 0.5])
+
+
+def culling_map() -> SparseMap:
+    """Four keyframes; points 0 to 5 begin in the first, 6 to 9 in the second, and so on."""
+    sparse_map = SparseMap()
+    seen = [[0, 1, 2, 3, 4, 5], [0, 1, 2, 6, 7, 8, 9], [1, 2, 3, 7, 8, 10], [2, 8, 10, 11]]
+    for k, count in enumerate((6, 4, 1, 1)):
+        sparse_map.new_points(np.full((count, 2), float(k)), k)
+        sparse_map.keyframes.append(keyframe(seen[k]))
+    sparse_map.place(np.array([0, 1, 2, 3, 6, 7]), np.ones((6, 3)))
+    return sparse_map
+
+
+def test_a_culled_keyframe_leaves_what_others_saw() -> None:
+    sparse_map = culling_map()
+    kept = [sparse_map.keyframes[k] for k in (0, 2, 3)]
+    sparse_map.cull(1)
+    assert sparse_map.keyframes == kept
+    assert (sparse_map.culled, sparse_map.made) == (1, 4)
+    # Seen by two others, by one, or by none.
+    assert sparse_map.mapped(np.array([1, 2, 3])).all()
+    assert not sparse_map.mapped(np.array([0, 6, 7])).any()
+    # What was not in it is as it was; every origin names a keyframe that was there then.
+    assert sparse_map.states[[4, 5, 10, 11]].tolist() == [CANDIDATE] * 4
+    assert sparse_map.origins[[0, 4, 10, 11]].tolist() == [0, 0, 1, 2]
+
+
+def test_candidates_of_a_culled_keyframe_begin_where_they_were_seen_next() -> None:
+    sparse_map = culling_map()
+    sparse_map.cull(1)
+    assert sparse_map.states[8] == CANDIDATE
+    assert sparse_map.origins[8] == 1
+    np.testing.assert_array_equal(sparse_map.first_pixels[8], [8.0, 0.0])
+    assert sparse_map.states[9] == DROPPED  # nobody else saw it

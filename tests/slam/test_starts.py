@@ -11,7 +11,7 @@ import pytest
 from airground.config import KeyframeSlam
 from airground.core.messages import ImuSamples, RobotCalibration
 from airground.core.se3 import SE3
-from airground.slam import so3
+from airground.slam import so3, starts
 from airground.slam.frame import Frame
 from airground.slam.inertial.preintegration import GRAVITY
 from airground.slam.motion_model import MotionModel
@@ -204,3 +204,27 @@ def test_a_hovering_robot_waits_and_a_new_place_is_a_new_beginning() -> None:
         start = start or wait.observe(Frame(next(stamps), view(*place).image), model)
     assert start is not None
     assert start.first.stamp_ns == elsewhere
+
+
+def test_where_nothing_is_seen_corners_are_sought_less_often(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    wait = TwoViewWait(CALIBRATION, KeyframeSlam(), np.random.default_rng(0))
+    model = motion_of(np.array([0, 0, GRAVITY]), np.zeros(3))
+    sought: list[int] = []
+    detect = starts.detect_corners
+
+    def watched(image: np.ndarray, *args: object) -> np.ndarray:
+        sought.append(int(image.max()))
+        return detect(image, *args)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(starts, "detect_corners", watched)
+    for n in range(60):
+        assert wait.observe(Frame((n + 1) * 10**8, IMAGE), model) is None
+    assert 10 <= len(sought) <= 15
+    # Once there is something to see, it is seen soon, and nothing is passed over any more.
+    for n in range(60, 60 + starts.MOST_PASSED_OVER + 3):
+        wait.observe(Frame((n + 1) * 10**8, view(0.9, 0.9, seed=n).image), model)
+    assert sought[-1] > 0
+    assert wait._first is not None
+    assert len(wait._tracker.ids) > starts.MIN_CORNERS

@@ -1,0 +1,135 @@
+"""Taking out keyframes that show nothing which others do not show as well.
+
+The rule of ORB-SLAM (Mur-Artal, Montiel and Tardos, T-RO 2015, Sec. VI-E), with one difference:
+there, others must have seen a keyframe's points; here it is enough that they look where the
+points are, from about the same side. A place that is visited again and again gets new points
+each time, and only so the number of keyframes stays bounded in a bounded area.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.config import KeyframeSlam
+from airground.core.camera import PinholeCamera
+from airground.core.se3 import SE3
+from airground.slam.map_adjustment import MapAdjuster
+from airground.slam.reacquisition import BORDER_PX, MAX_TURN_DEG, MAX_ZOOM
+from airground.slam.recovery import Recovery
+from airground.slam.sparse_map import SparseMap
+from airground.slam.tracked_path import TrackedPath
+
+COVERED_SHARE = 0.9
+"""Of the points that a keyframe saw, at least so many must be in view of others ..."""
+COVERED_BY = 5
+"""... namely of so many others."""
+
+
+class KeyframeCuller:
+    """Looks at one or two keyframes whenever a new one was made.
+
+    Those of the window are never taken out, nor the first keyframe, and none that adjusting the
+    whole map still needs for its inertial motion.
+
+    Args:
+        sparse_map, adjuster, recovery, path: Changed in place.
+        camera, T_rig_camera: The robot's camera.
+        parameters: The robot's section of the configuration.
+    """
+
+    def __init__(
+        self,
+        sparse_map: SparseMap,
+        adjuster: MapAdjuster,
+        recovery: Recovery,
+        path: TrackedPath,
+        camera: PinholeCamera,
+        T_rig_camera: SE3,
+        parameters: KeyframeSlam,
+    ) -> None:
+        self._map = sparse_map
+        self._adjuster = adjuster
+        self._recovery = recovery
+        self._path = path
+        self._camera = camera
+        self._T_rig_camera = T_rig_camera
+        self._parameters = parameters
+        self._next = 1
+
+    def cull(self, inertial: bool) -> None:
+        """Judge the keyframe that just left the window and, in turn, one of the older ones.
+
+        Args:
+            inertial: Whether the map is metric and gravity-aligned by the accelerometer.
+        """
+        # One keyframe stays beside the window: inertial motion leads from it.
+        left = len(self._map.keyframes) - self._parameters.window - 2
+        if left >= 1:
+            self._judge(left, inertial)
+        if left >= 2:
+            self._next = self._next if self._next < left else 1
+            if not self._judge(self._next, inertial):
+                self._next += 1
+
+    def _judge(self, keyframe: int, inertial: bool) -> bool:
+        """Take a keyframe out if it may go; returns whether it did."""
+        if inertial and not self._adjuster.can_skip(keyframe):
+            return False
+        if not self.covered(keyframe):
+            return False
+        keyframes = self._map.keyframes
+        before, gone, after = keyframes[keyframe - 1 : keyframe + 2]
+        sooner = gone.stamp_ns - before.stamp_ns <= after.stamp_ns - gone.stamp_ns
+        self._path.rehang(gone, before if sooner else after)
+        self._adjuster.skip(keyframe, inertial)
+        self._recovery.forget(gone.stamp_ns)
+        self._map.cull(keyframe)
+        return True
+
+    def covered(self, keyframe: int) -> bool:
+        """Whether enough others outside of the window have a keyframe's points in view."""
+        one = self._map.keyframes[keyframe]
+        ids = one.ids[self._map.mapped(one.ids)]
+        if len(ids) == 0:
+            return True
+        points = self._map.positions[ids]
+        outside = self._map.keyframes[: -self._parameters.window - 1]
+        turned = np.array([other.state.rotation for other in outside])
+        centres = np.array([other.state.position for other in outside])
+        centres += turned @ self._T_rig_camera.translation
+        rotations = turned @ self._T_rig_camera.rotation
+        alike = self._alike(rotations, centres, keyframe, points.mean(axis=0))
+        alike[keyframe] = False
+        views = self._views(rotations[alike], centres[alike], points)
+        return bool((views >= COVERED_BY).mean() >= COVERED_SHARE)
+
+    def _alike(
+        self,
+        rotations: NDArray[np.float64],
+        centres: NDArray[np.float64],
+        keyframe: int,
+        middle: NDArray[np.float64],
+    ) -> NDArray[np.bool_]:
+        """(K,) which cameras see a place from the same side and about as far as a keyframe."""
+        cosines = (np.einsum("nij,ij->n", rotations, rotations[keyframe]) - 1.0) / 2.0
+        depths = np.einsum("ni,ni->n", middle - centres, rotations[:, :, 2])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            zoom = np.abs(np.log(depths / depths[keyframe]))
+        return (cosines > np.cos(np.deg2rad(MAX_TURN_DEG))) & (zoom < np.log(MAX_ZOOM))
+
+    def _views(
+        self,
+        rotations: NDArray[np.float64],
+        centres: NDArray[np.float64],
+        points: NDArray[np.float64],
+    ) -> NDArray[np.int64]:
+        """(n,) in how many of the cameras each point lies inside the image."""
+        seen = np.einsum("kij,kni->knj", rotations, points - centres[:, None])
+        camera = self._camera
+        with np.errstate(divide="ignore", invalid="ignore"):
+            x = camera.fx * seen[..., 0] / seen[..., 2] + camera.cx
+            y = camera.fy * seen[..., 1] / seen[..., 2] + camera.cy
+        inside = (seen[..., 2] > 0) & (x >= BORDER_PX) & (y >= BORDER_PX)
+        inside &= (x < camera.width - BORDER_PX) & (y < camera.height - BORDER_PX)
+        return inside.sum(axis=0)

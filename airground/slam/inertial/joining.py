@@ -1,0 +1,67 @@
+"""One inertial motion out of two that follow each other, without their samples.
+
+The composition of preintegrated motions, with covariance and Jacobians carried on by the chain
+rule as in Forster, Carlone, Dellaert and Scaramuzza, "On-manifold preintegration for real-time
+visual-inertial odometry", T-RO 2017, Appendix A and B.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.slam import so3
+from airground.slam.inertial.preintegration import Preintegration
+
+
+def join(first: Preintegration, second: Preintegration) -> Preintegration:
+    """The motion from the start of `first` to the end of `second`, which begins at its end.
+
+    It is free of the biases of `first`; those of `second` are brought there to first order.
+    """
+    turned, sped, moved = second.corrected(first.gyro_bias, first.accelerometer_bias)
+    R, t = first.rotation, second.duration_s
+    # What an error of the first motion's rotation, velocity and position does at the end.
+    onward = np.eye(9)
+    onward[0:3, 0:3] = turned.T
+    onward[3:6, 0:3] = -R @ so3.hat(sped)
+    onward[6:9, 0:3] = -R @ so3.hat(moved)
+    onward[6:9, 3:6] = t * np.eye(3)
+    # The second's velocity and position are in the axes of the rig between them.
+    beyond = np.eye(9)
+    beyond[3:6, 3:6] = beyond[6:9, 6:9] = R
+    jacobian = onward @ _by_biases(first) + beyond @ _by_biases(second)
+    return Preintegration(
+        first.duration_s + t,
+        _frozen(R @ turned),
+        _frozen(first.velocity + R @ sped),
+        _frozen(first.position + t * first.velocity + R @ moved),
+        _frozen(jacobian[0:3, 0:3]),
+        _frozen(jacobian[3:6, 0:3]),
+        _frozen(jacobian[3:6, 3:6]),
+        _frozen(jacobian[6:9, 0:3]),
+        _frozen(jacobian[6:9, 3:6]),
+        _frozen(onward @ first.covariance @ onward.T + beyond @ second.covariance @ beyond.T),
+        first.gyro_bias,
+        first.accelerometer_bias,
+        float(np.hypot(first.gyro_bias_sigma, second.gyro_bias_sigma)),
+        float(np.hypot(first.accelerometer_bias_sigma, second.accelerometer_bias_sigma)),
+        max(first.longest_gap_s, second.longest_gap_s),
+    )
+
+
+def _by_biases(motion: Preintegration) -> NDArray[np.float64]:
+    """(9, 6) rotation, velocity and position by the biases of gyro and accelerometer."""
+    return np.block(
+        [
+            [motion.rotation_by_gyro_bias, np.zeros((3, 3))],
+            [motion.velocity_by_gyro_bias, motion.velocity_by_accelerometer_bias],
+            [motion.position_by_gyro_bias, motion.position_by_accelerometer_bias],
+        ]
+    )
+
+
+def _frozen(array: NDArray[np.float64]) -> NDArray[np.float64]:
+    array = np.ascontiguousarray(array)
+    array.flags.writeable = False
+    return array
