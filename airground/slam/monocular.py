@@ -65,7 +65,8 @@ class MonocularSlam:
         fit, corrected = slam.track(frame)
         corrected |= self._scale.update(fit is not None)
         if not self._given_out:
-            if slam.unseen_s() > MAX_UNSEEN_S:
+            # Nobody looks for a map in which no pose was given out: nothing leads back to it.
+            if slam.unseen_s() > MAX_UNSEEN_S or slam.stranded():
                 self._give_up()
             if fit is None or fit.inliers.sum() < MIN_TRACKED or not self._scale.known:
                 return self._initializing(frame)
