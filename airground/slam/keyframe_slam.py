@@ -94,7 +94,7 @@ class KeyframeSlam:
         self._seen_ns = 0
         self._keyframe_covariance = np.zeros((6, 6))
         self._doubt: Doubt | None = None
-        self._torn = False
+        self._torn = self._adrift = False
         self.path.clear()
         own = self.camera, self.T_rig_camera, self.parameters
         self.adjuster = MapAdjuster(self.map, *own, self._inverse_depth_sigma)
@@ -148,7 +148,9 @@ class KeyframeSlam:
         lost = self._seen_ns != self.stamp_ns
         there = prediction.state.pose() @ self.T_rig_camera
         expected = expected_pixels(self.map, self.tracker, self.camera, self.T_map_camera(), there)
+        followed = len(self.tracker.ids)
         self.tracker.advance(frame.image, expected, 2 if lost else 0)
+        cut = len(self.tracker.ids) < self.parameters.min_points <= followed
         fit = self._fit(frame, prediction)
         if fit is None and self._doubt is not None:
             self._go_back(self._doubt, frame)
@@ -158,9 +160,10 @@ class KeyframeSlam:
         if fit is None:
             fit = self._recover(frame, prediction)
         self._move_on(frame, prediction, fit)
+        self._adrift = fit is None and (self._adrift or cut or not prediction.inertial)
         if self._in_doubt():
             return None, False
-        if fit is None and not (prediction.inertial and not len(self.path)):
+        if fit is None and (self._adrift or len(self.path)):
             return None, False
         timed = self.metric and self.calibration.imu is not None
         if self._choice.wanted(self.tracker, self.state, frame.stamp_ns, timed):
@@ -227,6 +230,15 @@ class KeyframeSlam:
     def unseen_s(self) -> float:
         """How long ago an image gave a pose [s]."""
         return 0.0 if self.stamp_ns is None else (self.stamp_ns - self._seen_ns) * 1e-9
+
+    def stranded(self) -> bool:
+        """Whether neither images nor, from an image that was tied to the map, inertia lead here.
+
+        Inertia may carry a robot on as long as corners tie its images together, though none be
+        in the map yet; a view that it alone ties to the one before begins another map.
+        """
+        followed = int(self.map.mapped(self.tracker.ids).sum())
+        return self._adrift and followed < self.parameters.min_points
 
     def depth_range(self) -> tuple[float, float] | None:
         """Nearest and farthest map point in the newest image [m]."""

@@ -46,7 +46,7 @@ class MonocularSlam:
         self._scale = self._unknown_scale()
         self._rest = RestStart(calibration)
         self._two_views = TwoViewWait(calibration, config.monocular_slam, start_rng)
-        self._given_out = False
+        self._given_out = self._left = False
         self._last_ns: int | None = None
 
     def add_imu(self, samples: ImuSamples) -> None:
@@ -65,7 +65,8 @@ class MonocularSlam:
         fit, corrected = slam.track(frame)
         corrected |= self._scale.update(fit is not None)
         if not self._given_out:
-            if slam.unseen_s() > MAX_UNSEEN_S:
+            # Nobody looks for a map in which no pose was given out: nothing leads back to it.
+            if slam.unseen_s() > MAX_UNSEEN_S or slam.stranded():
                 self._give_up()
             if fit is None or fit.inliers.sum() < MIN_TRACKED or not self._scale.known:
                 return self._initializing(frame)
@@ -94,7 +95,9 @@ class MonocularSlam:
 
     def _begin(self, frame: Frame) -> None:
         """Begin the map if the robot just left its place, or two views allow it."""
-        begin = self._rest.observe(frame, self._slam.motion) if self._tight else None
+        # Even flight reads as rest, and what was not seen cannot tell: nobody rests in the air.
+        may_rest = self._tight and not self._left
+        begin = self._rest.observe(frame, self._slam.motion) if may_rest else None
         if begin is not None:
             self._slam.metric = self._slam.inertial = True
             self._slam.begin(*begin, still=True)
@@ -106,6 +109,7 @@ class MonocularSlam:
 
     def _give_up(self) -> None:
         """Forget the map, and all that was known of its unit."""
+        self._left = True
         self._slam.reset()
         self._slam.metric = self._slam.inertial = False
         self._scale = self._unknown_scale()

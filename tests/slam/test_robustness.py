@@ -166,6 +166,28 @@ def test_missing_inertial_samples_do_not_matter(
     assert set(states(tracked, t)) == {TRACKED}
 
 
+@pytest.mark.parametrize(
+    ("dark_s", "silent_s"),
+    [((3.0, 4.0), (3.0, 5.0)), ((2.7, 3.7), (3.0, 3.3)), ((2.7, 3.7), None), ((1.6, 2.6), None)],
+    ids=["both", "within-the-dark", "dark-2.7", "dark-1.6"],
+)
+def test_a_hole_before_the_first_pose_begins_another_map(
+    dark_s: tuple[float, float], silent_s: tuple[float, float] | None
+) -> None:
+    """Undisturbed, the first pose comes at 3.2 s; beyond the hole nobody knows where that was."""
+    whole = hard.flight(*TAKE_OFF, Leg(8.0, speed_mps=0.5, sway=1.0), height_m=FLOOR_M)
+    sequence = hard.darkened(whole, *dark_s)
+    if silent_s is not None:
+        sequence = hard.without_imu(sequence, *silent_s)
+    front_end = front_end_of(sequence)
+    tracked = sequence.feed(front_end)
+    assert set(states(tracked, 0.0, dark_s[1])) == {INITIALIZING}
+    began_ns = front_end._slam.map.keyframes[0].stamp_ns
+    assert began_ns >= START_NS + round(dark_s[0] * 1e9), "the map reaches across the hole"
+    if TRACKED in states(tracked, dark_s[1]):
+        assert_no_silent_jump(sequence, tracked)
+
+
 @both_robots
 @pytest.mark.parametrize("gain", [0.5, 1.8])
 @pytest.mark.parametrize("seconds", [1 / hard.HZ, np.inf], ids=["once", "from-then-on"])
