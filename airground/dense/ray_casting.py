@@ -164,7 +164,7 @@ def scan(
         for x in range(columns):
             if hit[x] < 0:
                 continue
-            k = np.int64(hit[x])
+            k = int(hit[x])
             here, behind = phi[y, k, x], phi[y, k + 1, x]
             crossing = here / (here - behind)
             fraction = _line_zero(phi[y, :, x], k, reach, crossing)
