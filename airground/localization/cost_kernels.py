@@ -17,7 +17,7 @@ BLOCK = 512
 """Cells that are placed, looked up and added up at a time, so that they stay in the cache."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def zmssd(sums: NDArray, min_count: float) -> NDArray[np.float32]:
     """Eq. 2 [m^2] for sums (N, 6); NaN where fewer than `min_count` cells overlap."""
     costs = np.empty(len(sums), np.float32)
@@ -33,7 +33,7 @@ def zmssd(sums: NDArray, min_count: float) -> NDArray[np.float32]:
     return costs
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def one_minus_correlation(
     sums: NDArray, min_count: float, min_relief_m: float
 ) -> NDArray[np.float32]:
