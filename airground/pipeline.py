@@ -37,11 +37,15 @@ from airground.core.messages import (
 from airground.core.se3 import SE3
 from airground.core.surface import AerialSurface
 from airground.dense.reconstruction import DenseReconstruction
+from airground.dense.warm_up import warm_up_dense
 from airground.ground_map import GroundMap
 from airground.localization.heading import HeadingEstimator
 from airground.localization.particle_filter import MonteCarloLocalizer
+from airground.localization.warm_up import warm_up_localization
 from airground.refinement import refine
+from airground.refinement.warm_up import warm_up_refinement
 from airground.slam.front_end import FrontEnd, TrackedPose, Tracking
+from airground.slam.warm_up import warm_up_slam
 
 
 @dataclass(frozen=True)
@@ -287,3 +291,16 @@ def moved(cloud: PointCloud, T_a_b: SE3) -> PointCloud:
     if cloud.normals is not None:
         normals = (cloud.normals @ T_a_b.rotation.T).astype(np.float32)
     return PointCloud((T_a_b @ cloud.points).astype(np.float32), cloud.colours, normals)
+
+
+def warm_up(config: Config, rng: np.random.Generator) -> None:
+    """Compile what all stages need, so that no frame has to wait for it.
+
+    Args:
+        config: What will run.
+        rng: Draws what it is tried on.
+    """
+    warm_up_slam(rng)
+    warm_up_dense(config)
+    warm_up_localization(config, rng)
+    warm_up_refinement(config)

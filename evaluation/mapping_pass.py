@@ -17,8 +17,7 @@ from airground.core.events import (
 )
 from airground.core.surface import DepthMap
 from airground.io.recording import Recording
-from airground.pipeline import Mapping, Sighting, sight
-from airground.slam.warm_up import warm_up_slam
+from airground.pipeline import Mapping, Sighting, sight, warm_up
 from evaluation.front_ends import front_ends_for
 from evaluation.setups import Setup
 from evaluation.timing import STAGE_OF, timed
@@ -53,7 +52,8 @@ def map_recording(recording: Recording, truth: Truth, setup: Setup, seed: int) -
     maps = Maps()
     made: dict[int, DepthMap] = {}
     fused: list[DepthMap] = []
-    warm_up_slam(np.random.default_rng(0))  # compiling is no part of what is timed
+    # Compiling is no part of what is timed.
+    warm_up(setup.config, np.random.default_rng(0))
     started = time.perf_counter()
     for event, duration_ms in timed(_events(recording, mapping)):
         if type(event) in STAGE_OF:

@@ -20,8 +20,7 @@ from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.io.recording import Recording
 from airground.io.tum import write_tum
-from airground.pipeline import Pipeline, Sighting, sight
-from airground.slam.warm_up import warm_up_slam
+from airground.pipeline import Pipeline, Sighting, sight, warm_up
 from evaluation.experiment import peak_memory_mib
 from evaluation.front_ends import front_ends_for
 from evaluation.relation import pose_error
@@ -64,7 +63,8 @@ def run_recording(recording: Recording, truth: Truth, setup: Setup, seed: int) -
     condition = setup.condition(recording.sensors)
     out = RowWriter(recording.scene, recording.seed, recording.flight, condition)
     measure = _Measure(out, pipeline, truth)
-    warm_up_slam(np.random.default_rng(0))  # compiling is no part of what is timed
+    # Compiling is no part of what is timed.
+    warm_up(setup.config, np.random.default_rng(0))
     started = time.perf_counter()
     for event, duration_ms in timed(pipeline.run(recording.messages())):
         measure.take(event, duration_ms)

@@ -50,7 +50,7 @@ def lattice_index(height_map: HeightMap) -> NDArray[np.int64]:
     return np.rint(height_map.origin * height_map.cells_per_m).astype(np.int64)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _cell_extent(points: NDArray, cells_per_m: np.float32) -> NDArray[np.int64]:
     """(2, 2) lowest and highest cell index of finite points; reversed without any."""
     half = np.float32(0.5)
@@ -66,7 +66,7 @@ def _cell_extent(points: NDArray, cells_per_m: np.float32) -> NDArray[np.int64]:
     return extent
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _raise_cells(
     points: NDArray, first_x: int, first_y: int, cells_per_m: np.float32, heights: NDArray
 ) -> None:
@@ -82,7 +82,7 @@ def _raise_cells(
             heights[ix, iy] = z
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _dilate_holes(heights: NDArray) -> NDArray:
     nx, ny = heights.shape
     filled = heights.copy()

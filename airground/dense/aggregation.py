@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from airground.dense.plane_sweep import CostVolume
 from airground.dense.sweep_kernels import COST_SCALE
+from airground.dense.workspace import Workspace
 
 FAST = {"contract", "reassoc", "arcp", "nsz"}
 MEAN_SCALE = 128.0
@@ -24,7 +25,11 @@ ROWS_A_TASK = 12
 
 
 def aggregate(
-    volumes: list[CostVolume], window_px: int, truncation: float, one_side_penalty: float
+    volumes: list[CostVolume],
+    window_px: int,
+    truncation: float,
+    one_side_penalty: float,
+    workspace: Workspace,
 ) -> NDArray[np.uint16]:
     """Mean cost over a square window and over the views.
 
@@ -33,6 +38,7 @@ def aggregate(
         window_px: Side of the window, odd.
         truncation: Cost of a sample at most, and of a place that no view covers [grey levels].
         one_side_penalty: What the mean over one side costs more than over both [grey levels].
+        workspace: Where the result is taken from.
 
     Returns:
         (height, width, planes) uint16 in 1/128 of a grey level.
@@ -43,7 +49,7 @@ def aggregate(
     if not volumes:
         raise ValueError("no view was added to the sweep")
     height, planes, width = volumes[0].costs.shape
-    mean = np.empty((height, width, planes), np.uint16)
+    mean = workspace.take((height, width, planes))
     first, last = volumes[0], volumes[-1]
     box_mean(
         first.costs,

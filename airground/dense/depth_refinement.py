@@ -30,16 +30,24 @@ def depth_from_costs(sweep: PlaneSweep, parameters: Parameters) -> NDArray[np.fl
     Returns:
         (height, width) float32 [m], NaN where the depth is uncertain.
     """
+    workspace = sweep.workspace
     mean = aggregate(
-        sweep.volumes, parameters.window_px, parameters.truncation, parameters.one_side_penalty
+        sweep.volumes,
+        parameters.window_px,
+        parameters.truncation,
+        parameters.one_side_penalty,
+        workspace,
     )
     costs = mean
     if parameters.smoothing == "semiglobal":
-        costs = smooth(mean, sweep.reference, parameters)
+        costs = smooth(mean, sweep.reference, parameters, workspace)
     inverse = 1.0 / sweep.depths
     shape = mean.shape[:2]
     plane, sigma = np.empty(shape, np.float32), np.empty(shape, np.float32)
     pick(costs, mean, plane, sigma)
+    workspace.give(mean)
+    if costs is not mean:
+        workspace.give(costs)
     depth = 1.0 / (inverse[0] + plane * (inverse[1] - inverse[0]))
     sigma_m = sigma * depth**2 * abs(inverse[1] - inverse[0])
     # comparisons with NaN are false: what has no minimum is dropped here

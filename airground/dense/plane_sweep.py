@@ -19,6 +19,7 @@ from airground.config import PlaneSweep as Parameters
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.dense import sweep_kernels as kernels
+from airground.dense.workspace import Workspace
 
 GAIN_BLUR_PX = 21
 """Brightness is compared over squares of this side [px] ..."""
@@ -114,12 +115,13 @@ class CostVolume:
     """Photometric errors of one reference view at every pixel and plane, over several views.
 
     Attributes:
-        costs: (height, planes, width) uint16, summed over views, sixteenths of grey levels.
+        costs: (height, planes, width) uint16, summed over views, sixteenths of grey levels;
+            anything before the first view.
         limits: One (height, planes, 2) int16 a view: the columns [lo, hi) that it covers.
     """
 
-    def __init__(self, height: int, planes: int, width: int) -> None:
-        self.costs = np.zeros((height, planes, width), np.uint16)
+    def __init__(self, costs: NDArray[np.uint16]) -> None:
+        self.costs = costs
         self.limits: list[NDArray[np.int16]] = []
 
 
@@ -136,6 +138,7 @@ class PlaneSweep:
         depths: (planes,) [m], the hypotheses, evenly spaced in inverse depth.
         parameters: The section `plane_sweep` of the configuration.
         sides: Number of cost volumes.
+        workspace: Where they are taken from.
     """
 
     def __init__(
@@ -146,6 +149,7 @@ class PlaneSweep:
         depths: NDArray[np.float64],
         parameters: Parameters,
         sides: int,
+        workspace: Workspace | None = None,
     ) -> None:
         self.full_camera = camera
         self.camera = camera.halved()
@@ -154,11 +158,18 @@ class PlaneSweep:
         self.parameters = parameters
         self.reference = halved(image)
         shape = (self.camera.height, len(depths), self.camera.width)
-        self.volumes = [CostVolume(*shape) for _ in range(sides)]
+        self.workspace = workspace or Workspace()
+        self.volumes = [CostVolume(self.workspace.take(shape)) for _ in range(sides)]
 
     @property
     def views(self) -> int:
         return sum(len(volume.limits) for volume in self.volumes)
+
+    def release(self) -> None:
+        """Hand the cost volumes back to the workspace; the sweep is of no use afterwards."""
+        for volume in self.volumes:
+            self.workspace.give(volume.costs)
+        self.volumes = []
 
     def add(self, image: NDArray[np.uint8], T_mav_camera: SE3, side: int) -> None:
         """Compares one more view with the reference at every plane."""
@@ -173,6 +184,7 @@ class PlaneSweep:
         limits = np.empty((height, planes, 2), np.int16)
         kernels.add_view(
             volume.costs,
+            not volume.limits,
             limits,
             self.reference,
             view.phases,

@@ -69,12 +69,43 @@ def surface_cloud(
 
 
 @njit(cache=True, inline="always")
-def _votes_near_surface(word: int, bins: int) -> int:
-    """Votes in all bins but the last, which says "free"."""
-    votes = 0
-    for j in range(bins - 1):
-        votes += (word >> (4 * j)) & 15
-    return votes
+def _sum_of_counts(word: np.uint32) -> np.uint32:
+    """Sum of the eight counts of four bits each: first of pairs, then of all four bytes."""
+    bytes_ = np.uint32(0x0F0F0F0F)
+    pairs = np.uint32(word & bytes_) + np.uint32(np.uint32(word >> np.uint32(4)) & bytes_)
+    return np.uint32(np.uint32(np.uint32(pairs) * np.uint32(0x01010101)) >> np.uint32(24))
+
+
+@njit(cache=True, error_model="numpy")
+def _first_hits(
+    here: NDArray,
+    behind: NDArray,
+    word_here: NDArray,
+    word_behind: NDArray,
+    near: np.uint32,
+    votes: np.uint32,
+    k: int,
+    hit: NDArray,
+) -> None:
+    """Notes plane k where phi first falls below zero between it and the next, with support.
+
+    Args:
+        here, behind: (columns,) phi on plane k and on the next.
+        word_here, word_behind: (columns,) uint32, their packed histograms.
+        near: Mask of the bins that vote for a surface close by.
+        votes: How many of them there must be.
+        hit: (columns,) int32, -1 where nothing was hit yet; changed.
+    """
+    zero, plane = np.float32(0), np.int32(k)
+    crossings = np.uint32(0)
+    for x in range(len(hit)):
+        crossings |= np.uint32((here[x] > zero) & (behind[x] <= zero))
+    if crossings == 0:
+        return
+    for x in range(len(hit)):
+        most = max(_sum_of_counts(word_here[x] & near), _sum_of_counts(word_behind[x] & near))
+        new = (here[x] > zero) & (behind[x] <= zero) & (most >= votes) & (hit[x] < 0)
+        hit[x] = plane if new else hit[x]
 
 
 @njit(cache=True, error_model="numpy")
@@ -120,46 +151,40 @@ def scan(
     """Finds in each column the first supported change of phi from positive to negative."""
     rows, planes, columns = phi.shape
     fx, fy, cx, cy = intrinsics
+    # Votes in all bins but the last, which says "free".
+    near, votes = np.uint32((1 << (4 * (bins - 1))) - 1), np.uint32(max(min_observations, 0))
     for y in prange(rows):
         row = np.int64(y)
         up, down = row - 1 if row > 0 else row, row + 1 if row + 1 < rows else row
-        open_columns = np.ones(columns, np.bool_)
+        hit = np.full(columns, np.int32(-1), np.int32)
         for k in range(planes - 1):
-            here, behind = phi[y, k], phi[y, k + 1]
-            crossings = 0
-            for x in range(columns):
-                crossings += (here[x] > 0) & (behind[x] <= 0) & open_columns[x]
-            if crossings == 0:
+            _first_hits(
+                phi[y, k], phi[y, k + 1], counts[y, k], counts[y, k + 1], near, votes, k, hit
+            )
+        for x in range(columns):
+            if hit[x] < 0:
                 continue
-            for x in range(columns):
-                if not (open_columns[x] and here[x] > 0 and behind[x] <= 0):
-                    continue
-                votes = max(
-                    _votes_near_surface(int(counts[y, k, x]), bins),
-                    _votes_near_surface(int(counts[y, k + 1, x]), bins),
-                )
-                if votes < min_observations:
-                    continue
-                open_columns[x] = False
-                crossing = here[x] / (here[x] - behind[x])
-                fraction = _line_zero(phi[y, :, x], k, reach, crossing)
-                z = plane_depths[k] + fraction * (plane_depths[k + 1] - plane_depths[k])
-                depth[y, x] = z
-                left, right = max(x - 1, 0), min(x + 1, columns - 1)
-                near = k if crossing < 0.5 else k + 1
-                k0, k1 = max(k - 1, 0), min(k + 2, planes - 1)
-                gx = (phi[y, near, right] - phi[y, near, left]) / (right - left)
-                gy = (phi[down, near, x] - phi[up, near, x]) / (down - up)
-                gk = (phi[y, k1, x] - phi[y, k0, x]) / (plane_depths[k1] - plane_depths[k0])
-                # x = fx X / Z + cx: a step in Z at fixed X, Y also moves the pixel
-                nx, ny = gx * fx / z, gy * fy / z
-                nz = gk - gx * (x - cx) / z - gy * (y - cy) / z
-                norm = np.sqrt(nx * nx + ny * ny + nz * nz)
-                if norm > 0:
-                    normals[y, x, 0] = nx / norm
-                    normals[y, x, 1] = ny / norm
-                    normals[y, x, 2] = nz / norm
-                else:
-                    normals[y, x, 0] = 0.0
-                    normals[y, x, 1] = 0.0
-                    normals[y, x, 2] = -1.0
+            k = int(hit[x])
+            here, behind = phi[y, k, x], phi[y, k + 1, x]
+            crossing = here / (here - behind)
+            fraction = _line_zero(phi[y, :, x], k, reach, crossing)
+            z = plane_depths[k] + fraction * (plane_depths[k + 1] - plane_depths[k])
+            depth[y, x] = z
+            left, right = max(x - 1, 0), min(x + 1, columns - 1)
+            closest = k if crossing < 0.5 else k + 1
+            k0, k1 = max(k - 1, 0), min(k + 2, planes - 1)
+            gx = (phi[y, closest, right] - phi[y, closest, left]) / (right - left)
+            gy = (phi[down, closest, x] - phi[up, closest, x]) / (down - up)
+            gk = (phi[y, k1, x] - phi[y, k0, x]) / (plane_depths[k1] - plane_depths[k0])
+            # x = fx X / Z + cx: a step in Z at fixed X, Y also moves the pixel
+            nx, ny = gx * fx / z, gy * fy / z
+            nz = gk - gx * (x - cx) / z - gy * (y - cy) / z
+            norm = np.sqrt(nx * nx + ny * ny + nz * nz)
+            if norm > 0:
+                normals[y, x, 0] = nx / norm
+                normals[y, x, 1] = ny / norm
+                normals[y, x, 2] = nz / norm
+            else:
+                normals[y, x, 0] = 0.0
+                normals[y, x, 1] = 0.0
+                normals[y, x, 2] = -1.0

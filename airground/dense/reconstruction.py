@@ -27,6 +27,7 @@ from airground.dense.ray_casting import cast_surface, surface_cloud
 from airground.dense.scene_extent import scene_extent
 from airground.dense.view_selection import AFTER, BEFORE, PosedImage, ViewBuffer, ViewSet
 from airground.dense.volume import Volume
+from airground.dense.workspace import Workspace
 
 MAX_OPEN = 4
 """Depth maps under construction at a time; more never overlap on a sensible path."""
@@ -51,6 +52,7 @@ class DenseReconstruction:
         self._recent = ViewBuffer(config.view_selection)
         self._last_reference: PosedImage | None = None
         self._open: list[tuple[ViewSet, PlaneSweep]] = []
+        self._workspace = Workspace()
         self._depth_maps: list[DepthMap] = []
         self._fusion = Fusion(
             config.fusion.data_weight, config.fusion.iterations, config.fusion.bins
@@ -119,8 +121,16 @@ class DenseReconstruction:
         )
         sides = 2 if selection.both_sides else 1
         sweep = PlaneSweep(
-            frame.image, self.camera, frame.T_mav_camera, planes, self.config.plane_sweep, sides
+            frame.image,
+            self.camera,
+            frame.T_mav_camera,
+            planes,
+            self.config.plane_sweep,
+            sides,
+            self._workspace,
         )
+        for _, abandoned in self._open[: 1 - MAX_OPEN]:
+            abandoned.release()
         self._open = [*self._open[-(MAX_OPEN - 1) :], (views, sweep)]
         if selection.both_sides:
             for view in reversed(before):
@@ -133,6 +143,7 @@ class DenseReconstruction:
         for views, sweep in [pair for pair in self._open if pair[0] in finished]:
             self._open = [pair for pair in self._open if pair[0] is not views]
             if not views.suffices():
+                sweep.release()
                 continue
             depth = depth_from_costs(sweep, self.config.plane_sweep)
             depth_map = DepthMap(
@@ -143,6 +154,7 @@ class DenseReconstruction:
                 np.round(sweep.reference).astype(np.uint8),
                 sweep.views,
             )
+            sweep.release()
             yield DepthMapMade(self._newest_ns, depth_map)
             if self._leaves_surface(depth_map):
                 yield from self._fuse()

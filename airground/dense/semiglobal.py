@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from airground.config import PlaneSweep as Parameters
 from airground.dense.aggregation import MEAN_SCALE
+from airground.dense.workspace import Workspace
 
 FAST = {"contract", "reassoc", "arcp", "nsz"}
 STRIPS = 16
@@ -21,7 +22,10 @@ STRIPS = 16
 
 
 def smooth(
-    mean: NDArray[np.uint16], reference: NDArray[np.float32], parameters: Parameters
+    mean: NDArray[np.uint16],
+    reference: NDArray[np.float32],
+    parameters: Parameters,
+    workspace: Workspace,
 ) -> NDArray[np.uint16]:
     """Sum over four directions of the costs of the cheapest path that ends at each pixel.
 
@@ -29,12 +33,13 @@ def smooth(
         mean: (height, width, planes) uint16, costs in 1/128 of a grey level.
         reference: (height, width) float32, the image whose edges make jumps cheap.
         parameters: With the penalties.
+        workspace: Where the result is taken from.
 
     Returns:
         (height, width, planes) uint16. Path costs are counted from the path's cheapest
         plane before, so that they stay below cost + jump penalty and the sum fits.
     """
-    total = np.zeros_like(mean)
+    total = workspace.take(mean.shape)
     step = int(MEAN_SCALE * parameters.step_penalty)
     jump, edge = MEAN_SCALE * parameters.jump_penalty, parameters.edge_levels
     along_rows(mean, reference, step, jump, edge, total)
@@ -71,9 +76,10 @@ def _jump(step: int, jump: float, edge: float, here: float, before: float) -> in
 def along_rows(
     mean: NDArray, image: NDArray, step: int, jump: float, edge: float, total: NDArray
 ) -> None:
-    """Adds the paths from the left and from the right."""
+    """The sum of the paths from the left and from the right."""
     height, width, planes = mean.shape
     for y in prange(height):
+        total[y] = np.uint16(0)
         paths = np.empty((2, planes + 2), np.uint16)
         for direction in range(2):
             paths[:] = np.uint16(30000)

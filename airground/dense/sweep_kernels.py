@@ -52,6 +52,7 @@ def plan_columns(scale: NDArray, shift: NDArray, width: int) -> tuple[NDArray, N
 @njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
 def add_view(
     costs: NDArray,
+    first_view: bool,
     limits: NDArray,
     reference: NDArray,
     phases: NDArray,
@@ -67,6 +68,7 @@ def add_view(
 
     Args:
         costs: (height, planes, width) uint16, sixteenths of grey levels, added to.
+        first_view: Whether what stands in `costs` counts for nothing.
         limits: (height, planes, 2) int16, filled: columns [lo, hi) that the view covers.
         reference: (height, width) float32.
         phases: (2, height, 2, width) float32, the view's even and odd rows and columns.
@@ -79,6 +81,8 @@ def add_view(
     cap = np.float32(truncation)
     scale = np.float32(COST_SCALE)
     for y in prange(height):
+        if first_view:
+            costs[y] = np.uint16(0)
         top_even = np.empty(width + 1, np.float32)
         top_odd = np.empty(width + 1, np.float32)
         for p in range(planes):

@@ -16,7 +16,7 @@ from airground.dense.ray_casting import cast_surface, surface_cloud
 from airground.dense.volume import Volume
 
 
-def warm_up(config: Config) -> None:
+def warm_up_dense(config: Config) -> None:
     """Takes a postage stamp of nothing through all stages."""
     camera = PinholeCamera(64, 48, 40.0, 40.0, 31.5, 23.5)
     image = np.full((48, 64), 100, np.uint8)

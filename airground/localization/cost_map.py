@@ -212,10 +212,11 @@ def overlay_turned(aerial: HeightMap, ground: HeightMap, poses: NDArray) -> Over
     a, g = masked(aerial.heights), masked(ground.heights, margin=2)
     ix, iy = np.nonzero(a.mask)
     first = lattice_index(aerial)
-    cells = np.column_stack([ix + first[0], iy + first[1], a.heights[ix, iy]]).astype(np.float32)
+    cells = np.array([ix + first[0], iy + first[1], a.heights[ix, iy]], np.float32)
+    holed = np.where(g.mask > 0, g.heights, np.float32(np.nan))
     poses = np.array(poses, np.float64)
     poses[:, :2] = poses[:, :2] * ground.cells_per_m - lattice_index(ground) + 2
-    sums = sums_at_poses(cells, g.heights, g.mask, poses)
+    sums = sums_at_poses(cells, holed, poses)
     return Overlays(sums, a.mean, g.mean, aerial.filled_cells)
 
 

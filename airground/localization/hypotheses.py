@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
+from numba import get_num_threads
 from numpy.typing import ArrayLike, NDArray
 
 from airground.config import Localization
@@ -16,7 +17,6 @@ from airground.localization.particles import draw_cells
 
 COARSE_STEP_DEG = 4.0
 REFINED_MODES = 12
-THREADS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +91,7 @@ def search_headings(
         return _costs_turned(search, cells, turn, aerial.cells_per_m, config)
 
     coarse = list(range(0, config.headings, step))
-    with ThreadPoolExecutor(THREADS) as pool:
+    with ThreadPoolExecutor(get_num_threads()) as pool:
         found = dict(zip(coarse, pool.map(costs_of, coarse), strict=True))
         lowest = {turn: np.nanmin(c) for turn, c in found.items() if np.isfinite(c).any()}
         promising = sorted(lowest, key=lambda turn: lowest[turn])[:REFINED_MODES]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import small_gicp
+from numba import get_num_threads
 from numpy.typing import NDArray
 
 NEIGHBOURS = 10
@@ -30,7 +31,9 @@ class Surfels:
 
     def nearest(self, points: NDArray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """(N,) index of the nearest point, and (N,) squared distance to it [m^2]."""
-        index, squared = self.tree.batch_nearest_neighbor_search(points, num_threads=2)
+        index, squared = self.tree.batch_nearest_neighbor_search(
+            points, num_threads=get_num_threads()
+        )
         return np.asarray(index, np.int64), np.asarray(squared)
 
 
@@ -44,7 +47,8 @@ def make_surfels(points: NDArray, voxel_m: float) -> Surfels:
     # One thread where the result would depend on how many there are.
     cloud = small_gicp.voxelgrid_sampling(np.asarray(points, np.float64), voxel_m, num_threads=1)
     tree = small_gicp.KdTree(cloud, num_threads=1)
-    small_gicp.estimate_normals(cloud, tree, num_neighbors=NEIGHBOURS, num_threads=2)
+    threads = get_num_threads()
+    small_gicp.estimate_normals(cloud, tree, num_neighbors=NEIGHBOURS, num_threads=threads)
     normals = np.array(cloud.normals()[:, :3])
     normals[normals[:, 2] < 0] *= -1
     return Surfels(np.array(cloud.points()[:, :3]), normals, tree)

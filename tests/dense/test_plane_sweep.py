@@ -12,6 +12,7 @@ from airground.config import PlaneSweep as Parameters
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.dense.aggregation import MEAN_SCALE, aggregate
+from airground.dense.depth_refinement import depth_from_costs
 from airground.dense.plane_sweep import (
     CostVolume,
     PlaneSweep,
@@ -20,6 +21,7 @@ from airground.dense.plane_sweep import (
     inverse_depth_planes,
 )
 from airground.dense.sweep_kernels import COST_SCALE, plan_columns
+from airground.dense.workspace import Workspace
 
 CAMERA = PinholeCamera(48, 32, 30.0, 31.0, 22.9, 16.2)
 
@@ -115,7 +117,7 @@ def test_aggregation_divides_by_the_samples_that_exist() -> None:
     rng = np.random.default_rng(2)
     volumes = []
     for _ in range(2):
-        volume = CostVolume(17, 5, 20)
+        volume = CostVolume(np.zeros((17, 5, 20), np.uint16))
         for _ in range(3):
             lo = rng.integers(0, 12, (17, 5))
             hi = np.minimum(lo + rng.integers(0, 14, (17, 5)), 20)
@@ -133,7 +135,7 @@ def test_aggregation_divides_by_the_samples_that_exist() -> None:
         )
         for volume in volumes
     ]
-    both, single = aggregate(volumes, 5, 40.0, 2.0), aggregate(volumes[1:], 5, 40.0, 2.0)
+    both, single = (aggregate(some, 5, 40.0, 2.0, Workspace()) for some in (volumes, volumes[1:]))
     for y, p, x in np.ndindex(17, 5, 20):
         window = np.s_[max(y - 2, 0) : y + 3, p, max(x - 2, 0) : x + 3]
         costs = [one[window].sum() / COST_SCALE for one in sums]
@@ -146,10 +148,11 @@ def test_aggregation_divides_by_the_samples_that_exist() -> None:
 
 
 def test_window_must_have_a_middle() -> None:
+    empty = CostVolume(np.zeros((4, 3, 5), np.uint16))
     with pytest.raises(ValueError, match="odd"):
-        aggregate([CostVolume(4, 3, 5)], 4, 40.0, 1.0)
+        aggregate([empty], 4, 40.0, 1.0, Workspace())
     with pytest.raises(ValueError, match="no view"):
-        aggregate([CostVolume(4, 3, 5)], 3, 40.0, 1.0)
+        aggregate([empty], 3, 40.0, 1.0, Workspace())
 
 
 def test_exposure_and_vignetting_of_a_view_do_not_matter() -> None:
@@ -162,3 +165,28 @@ def test_exposure_and_vignetting_of_a_view_do_not_matter() -> None:
     sweep = PlaneSweep(reference, camera, SE3.identity(), depths, Parameters(), 1)
     sweep.add(np.round(image * tilt).astype(np.uint8), SE3.identity(), 0)
     assert sweep.volumes[0].costs.mean() / COST_SCALE < 1.0
+
+
+@pytest.mark.parametrize("smoothing", ["none", "semiglobal"])
+def test_used_memory_leaves_no_trace(smoothing: str) -> None:
+    rng = np.random.default_rng(4)
+    images = rng.integers(0, 255, (3, 32, 48)).astype(np.uint8)
+    parameters = Parameters(smoothing=smoothing)
+    depths = inverse_depth_planes(0.6, 3.0, 16)
+
+    def depth_map(workspace: Workspace) -> NDArray:
+        sweep = PlaneSweep(images[0], CAMERA, SE3.identity(), depths, parameters, 2, workspace)
+        for side in (0, 1):
+            pose = SE3(np.eye(3), np.array([0.1 - 0.2 * side, 0.02, 0.03]))
+            sweep.add(images[1 + side], pose, side)
+        depth = depth_from_costs(sweep, parameters)
+        sweep.release()
+        return depth
+
+    used = Workspace()
+    for _ in range(4):
+        used.give(rng.integers(0, 65536, 16 * depths.size * 24).astype(np.uint16))
+    first = depth_map(used)
+    np.testing.assert_array_equal(first, depth_map(Workspace()))
+    np.testing.assert_array_equal(first, depth_map(used))
+    assert np.isfinite(first).any()

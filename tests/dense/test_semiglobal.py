@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from airground.config import PlaneSweep as Parameters
 from airground.dense.aggregation import MEAN_SCALE
 from airground.dense.semiglobal import smooth
+from airground.dense.workspace import Workspace
 
 PARAMETERS = Parameters(step_penalty=0.5, jump_penalty=5.0, edge_levels=5.0)
 
@@ -49,7 +50,7 @@ def test_smoothing_equals_the_recurrence() -> None:
     rng = np.random.default_rng(0)
     mean = rng.integers(0, 5120, (9, 37, 12)).astype(np.uint16)
     image = rng.uniform(0, 60, (9, 37)).astype(np.float32)
-    fast = smooth(mean, image, PARAMETERS)
+    fast = smooth(mean, image, PARAMETERS, Workspace())
     # an edge's penalty may round the other way in single precision
     assert np.abs(fast.astype(int) - slow_smooth(mean, image, PARAMETERS)).max() <= 4
 
@@ -66,4 +67,4 @@ def test_a_weak_patch_takes_the_plane_of_its_surroundings() -> None:
     mean[5:10, 5:10] = 300
     mean[7, 7, 3] = 250
     image = np.full((15, 15), 100, np.float32)
-    assert (smooth(mean, image, PARAMETERS).argmin(2) == 12).all()
+    assert (smooth(mean, image, PARAMETERS, Workspace()).argmin(2) == 12).all()
