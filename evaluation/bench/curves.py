@@ -10,7 +10,6 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike
 
-from airground.config import Config
 from airground.core.cloud import PointCloud
 from airground.dense.view_selection import PosedImage
 from airground.dense.volume import resized
@@ -54,7 +53,7 @@ def exponent(values: ArrayLike, times_ms: ArrayLike) -> float:
 
 def _image_width(material: Material, width_px: float) -> Work:
     """A frame added, from images made smaller."""
-    sweep = sweep_of(material, Config())
+    sweep = sweep_of(material, material.config)
     height_px = round(width_px * sweep.camera.height / sweep.camera.width)
     size = round(width_px), height_px
 
@@ -68,14 +67,14 @@ def _image_width(material: Material, width_px: float) -> Work:
 
 
 def _hypotheses(material: Material, planes: float) -> Work:
-    config = Config()
+    config = material.config
     parameters = config.plane_sweep.model_copy(update={"hypotheses": round(planes)})
     sweep = sweep_of(material, config.model_copy(update={"plane_sweep": parameters}))
     return Work(sweep.add_next, sweep.ready)
 
 
 def _voxels(material: Material, millions: float) -> Work:
-    config = Config()
+    config = material.config
     full = config.fusion.voxels
     scale = float(np.cbrt(millions * 1e6 / np.prod(full)))
     voxels = tuple(max(8, round(scale * n)) for n in full)

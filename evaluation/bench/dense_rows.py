@@ -102,17 +102,17 @@ class Sweep:
 
 def sweep_of(material: Material, config: Config) -> Sweep:
     """The sweep for the depth map in the middle of the surface."""
-    return Sweep(material.recording.mav.camera, material.reference, material.views, config)
+    return Sweep(material.mav_camera, material.reference, material.views, config)
 
 
 def add_frame(material: Material) -> Work:
-    sweep = sweep_of(material, Config())
+    sweep = sweep_of(material, material.config)
     floor = floors.add_frame(sweep.pixels, sweep.config.plane_sweep.hypotheses)
     return Work(sweep.add_next, sweep.ready, sweep.size, floor)
 
 
 def depth_map(material: Material) -> Work:
-    sweep = sweep_of(material, Config())
+    sweep = sweep_of(material, material.config)
     parameters = sweep.config.plane_sweep
     finished = sweep.complete()
     floor = floors.depth_map(
@@ -207,12 +207,12 @@ class VoxelWork:
 
 
 def distance_field(material: Material) -> Work:
-    work = VoxelWork(material.depth_maps, Config())
+    work = VoxelWork(material.depth_maps, material.config)
     return Work(work.add_one, work.make_room, work.size, floors.distance_field(work.voxels))
 
 
 def fusion(material: Material) -> Work:
-    work = VoxelWork(material.depth_maps, Config())
+    work = VoxelWork(material.depth_maps, material.config)
     work.add_all()
     parameters = work.config.fusion
     floor = floors.fusion(work.voxels, parameters.iterations, parameters.bins)
@@ -220,7 +220,7 @@ def fusion(material: Material) -> Work:
 
 
 def ray_cast(material: Material) -> Work:
-    work = VoxelWork(material.depth_maps, Config())
+    work = VoxelWork(material.depth_maps, material.config)
     work.add_all()
     phi = work.fuse()
     return Work(
@@ -230,7 +230,7 @@ def ray_cast(material: Material) -> Work:
 
 def surface(material: Material) -> Work:
     """Fields, fusion and casting of one surface: what other libraries do in one go."""
-    work = VoxelWork(material.depth_maps, Config())
+    work = VoxelWork(material.depth_maps, material.config)
     parameters, count = work.config.fusion, len(work.depth_maps)
     floor = floors.distance_field(work.voxels) * count
     floor += floors.fusion(work.voxels, parameters.iterations, parameters.bins)

@@ -169,7 +169,7 @@ def _particle_work(maps: Maps, update: object, count: int, turned: bool) -> Work
 
 def height_maps(material: Material) -> Work:
     """Both maps, as `best` makes them for each surface."""
-    maps = Maps(material, Config(), material.heading)
+    maps = Maps(material, material.config, material.heading)
     points = len(material.surface.cloud_mav), len(material.ground_cloud)
     cells = maps.aerial.heights.size + maps.ground.heights.size
     size = f"{points[0]} and {points[1]} points, {maps.aerial.cells_per_m:g} cells/m"

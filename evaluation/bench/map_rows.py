@@ -54,12 +54,12 @@ def refinement(material: Material, ground: PointCloud | None = None) -> Work:
         material: The surface.
         ground: The map; that of the material where None.
     """
-    return _refinement(material, Config(), ground or material.ground_cloud)
+    return _refinement(material, material.config, ground or material.ground_cloud)
 
 
 def augmentation(material: Material) -> Work:
     surface, motion = material.surface, material.T_ground_mav
-    voxels = Augmentation(Config().ground_mapping.voxel_m)
+    voxels = Augmentation(material.config.ground_mapping.voxel_m)
 
     def augment() -> object:
         voxels.add(surface, motion)
@@ -72,21 +72,21 @@ def augmentation(material: Material) -> Work:
 def ground_map(material: Material) -> Work:
     """One keyframe: packed, and fused into the distance field."""
     image, pose = material.ground_image, material.sighting.T_ground_camera
-    built = GroundMap(material.recording.ground.camera, Config().ground_mapping)
+    built = GroundMap(material.ground_camera, material.config.ground_mapping)
     height, width = image.depth.shape
     return Work(lambda: built.add(image, pose), size=f"{width} x {height} px")
 
 
 def read_grey(material: Material) -> Work:
     recording = material.recording
-    camera = recording.mav.camera
+    camera = material.mav_camera
     read = _in_turn(recording.read_mav_image, len(recording.mav_camera_stamps))
     return Work(read, size=f"{camera.width} x {camera.height} px, grey PNG")
 
 
 def read_colour_depth(material: Material) -> Work:
     recording = material.recording
-    camera = recording.ground.camera
+    camera = material.ground_camera
     read = _in_turn(recording.read_ground_image, len(recording.ground_camera_stamps))
     return Work(read, size=f"{camera.width} x {camera.height} px, colour and depth PNG")
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.config import Config
+from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
 from airground.core.events import (
     Aligned,
@@ -45,6 +46,8 @@ class Material:
 
     Attributes:
         recording: Where it comes from.
+        config: The parameters that it was made with.
+        mav_camera, ground_camera: Of the images.
         depth_maps: That were fused.
         reference: The view of the middle depth map ...
         views: ... and those that were compared with it, in order of time.
@@ -54,6 +57,9 @@ class Material:
     """
 
     recording: Recording
+    config: Config
+    mav_camera: PinholeCamera
+    ground_camera: PinholeCamera
     depth_maps: list[DepthMap]
     reference: PosedImage
     views: list[PosedImage]
@@ -120,7 +126,7 @@ def play(recording: Recording, config: Config, whole: bool) -> tuple[Material, P
     )
     front_ends = FrontEnds(mav, ground)
     pipeline = Pipeline(config, recording.mav, recording.ground, front_ends, rng)
-    gathering = _Gathering(recording, pipeline)
+    gathering = _Gathering(recording, config, pipeline)
     warm_up(config)
     warm_up_slam(np.random.default_rng(0))
     started, cpu = time.perf_counter(), time.process_time()
@@ -138,6 +144,7 @@ class _Gathering:
     """Listens to the pipeline."""
 
     recording: Recording
+    config: Config
     pipeline: Pipeline
     kept: Material | None = None
     _aligned: int = 0
@@ -185,6 +192,9 @@ class _Gathering:
         reference_ns = depth_maps[len(depth_maps) // 2].stamp_ns
         return Material(
             self.recording,
+            self.config,
+            self.recording.mav.camera,
+            self.recording.ground.camera,
             depth_maps,
             self._posed(reference_ns),
             [self._posed(stamp_ns) for stamp_ns in sorted(self._views[reference_ns])],

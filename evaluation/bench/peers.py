@@ -11,7 +11,7 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-from airground.config import Config, paper
+from airground.config import paper
 from airground.core.cloud import PointCloud
 from airground.core.surface import DepthMap
 from airground.dense.plane_sweep import halved, inverse_depth_planes
@@ -64,8 +64,8 @@ def _filled(heights: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[
 
 def plane_by_plane(material: Material) -> Work:
     """OpenCV: warp the view by each plane's homography, difference, truncate, add."""
-    config = Config().plane_sweep
-    camera = material.recording.mav.camera
+    config = material.config.plane_sweep
+    camera = material.mav_camera
     small = camera.halved()
     reference, view = material.reference, material.views[-1]
     extent = scene_extent(reference, material.views, camera)
@@ -100,16 +100,18 @@ def integrate_one(material: Material) -> Work:
     return Work(lambda: grid.integrate(material.reference_depth))
 
 
-def integrate_and_cast(material: Material) -> Work:
-    """Open3D: all depth maps of a surface, then cast into the reference view."""
+def integrate_and_extract(material: Material) -> Work:
+    """Open3D: all depth maps of a surface, then its points.
+
+    Not `ray_cast`: on a new grid of Open3D 0.20 its first call allocates too little, and finds
+    no surface.
+    """
 
     def build() -> object:
         grid = _Grid(material)
         for depth_map in material.depth_maps:
             grid.integrate(depth_map)
-        # It tells every time that it had to allocate more.
-        with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-            return grid.cast()
+        return grid.extract()
 
     return Work(build)
 
@@ -118,13 +120,13 @@ class _Grid:
     """Open3D's distance field with voxels as wide as ours are in the middle of the volume."""
 
     def __init__(self, material: Material) -> None:
-        fusion = Config().fusion
-        self._volume = Volume.around(
+        fusion = material.config.fusion
+        volume = Volume.around(
             material.depth_maps, material.reference_depth, fusion.voxels, fusion.truncation_m
         )
-        self._far_m = self._volume.far_m + 1.0
-        middle_m = 0.5 * (self._volume.near_m + self._volume.far_m)
-        voxel_m = middle_m / self._volume.camera.fx
+        self._far_m = volume.far_m + 1.0
+        middle_m = 0.5 * (volume.near_m + volume.far_m)
+        voxel_m = middle_m / volume.camera.fx
         self._truncation_voxels = fusion.truncation_m / voxel_m
         self._weight = float(fusion.min_observations)
         self._grid = o3d.t.geometry.VoxelBlockGrid(
@@ -135,7 +137,6 @@ class _Grid:
             block_resolution=BLOCK,
             block_count=FIRST_BLOCKS,
         )
-        self._blocks: list[o3d.core.Tensor] = []
 
     def integrate(self, depth_map: DepthMap) -> None:
         seen = np.nan_to_num(depth_map.depth, nan=0.0)
@@ -145,24 +146,9 @@ class _Grid:
         reach = (1.0, self._far_m, self._truncation_voxels)
         blocks = self._grid.compute_unique_block_coordinates(depth, intrinsics, extrinsics, *reach)
         self._grid.integrate(blocks, depth, intrinsics, extrinsics, *reach)
-        self._blocks.append(blocks)
 
-    def cast(self) -> object:
-        camera = self._volume.camera
-        # The view sees a part of the blocks; casting wants to be told which may be met.
-        return self._grid.ray_cast(
-            block_coords=self._blocks[len(self._blocks) // 2],
-            intrinsic=o3d.core.Tensor.from_numpy(camera.matrix()),
-            extrinsic=o3d.core.Tensor.from_numpy(self._volume.T_mav_camera.inverse().matrix()),
-            width=camera.width,
-            height=camera.height,
-            render_attributes=["depth", "normal", "vertex"],
-            depth_scale=1.0,
-            depth_min=0.1,
-            depth_max=self._far_m,
-            weight_threshold=self._weight,
-            trunc_voxel_multiplier=self._truncation_voxels,
-        )
+    def extract(self) -> o3d.t.geometry.PointCloud:
+        return self._grid.extract_point_cloud(self._weight - 0.5)
 
 
 def open3d_icp(material: Material) -> Work:

@@ -56,8 +56,8 @@ ROWS = (
             Peer(
                 "Open3D TSDF",
                 "open3d",
-                "a running mean, no regularization",
-                peers.integrate_and_cast,
+                "a running mean, no regularization; every crossing, not only what the view sees",
+                peers.integrate_and_extract,
             ),
         ),
     ),

@@ -69,8 +69,8 @@ def print_table(report: BenchReport, console: Console) -> None:
     for index, title in enumerate(header(report)):
         left = index == 0 or title == "peer"
         shown.add_column(title, justify="left" if left else "right", overflow="fold")
-    for line in body(report):
-        shown.add_row(*line)
+    for words in body(report):
+        shown.add_row(*words)
     console.print(shown)
     for line in footnotes(report):
         console.print(line, highlight=False)
