@@ -124,7 +124,7 @@ CURVES = (
     Curve("hypotheses", "Add a frame", "depth hypotheses", (25, 50, 100, 200, 400), _hypotheses),
     Curve(
         "voxels",
-        "A surface from its depth maps",
+        "A fused surface",
         "voxels [millions]",
         (1.7, 3.4, 6.8, 13.5, 27),
         _voxels,

@@ -22,6 +22,8 @@ COLUMNS = 4
 def bench_figure(report: BenchReport) -> Figure:
     """A bar a row: the median with all cores, a whisker to 95 %, one core as a tick.
 
+    The number at the right end is the median [ms].
+
     The part of a bar below the machine's floor is dark: what is light could go, in principle.
     The paper's value is a diamond, hollow where the paper used a GPU; peers are triangles.
     """
@@ -31,7 +33,7 @@ def bench_figure(report: BenchReport) -> Figure:
     low, high = _limits(rows)
     for place, row in enumerate(rows):
         _draw_row(axes, place, row, low)
-    _headings(axes, rows, high)
+    _headings(axes, rows)
     axes.set_xscale("log")
     axes.set_xlim(low, high)
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -53,8 +55,7 @@ def _limits(rows: list[RowResult]) -> tuple[float, float]:
     values += [peer.timing.median_ms for row in rows for peer in row.peers]
     values += [row.best.floor_ms for row in rows if row.best.floor_ms]
     smallest = min(value for value in values if value > 0)
-    # Room for the numbers to the right of the longest bar.
-    return max(10 ** math.floor(math.log10(smallest)), 0.01), max(values) * 4
+    return max(10 ** math.floor(math.log10(smallest)), 0.01), max(values) * 2
 
 
 def _draw_row(axes: Axes, place: int, row: RowResult, low: float) -> None:
@@ -76,23 +77,21 @@ def _draw_row(axes: Axes, place: int, row: RowResult, low: float) -> None:
             row.published_ms, place, "D", color=PAPER, markersize=7, zorder=5,
             markerfacecolor="white" if row.published_on == "GPU" else PAPER, markeredgewidth=1.6,
         )  # fmt: skip
-    ends = [timing.p95_ms, row.lanes[0].timing.median_ms, row.published_ms or 0]
-    ends += [peer.timing.median_ms for peer in row.peers]
     axes.annotate(
-        _number(timing.median_ms), (max(ends), place), (9, 0), textcoords="offset points",
-        va="center", fontsize=9, color=HERE, fontweight="bold",
+        _number(timing.median_ms), (1, place), (34, 0), xycoords=axes.get_yaxis_transform(),
+        textcoords="offset points", ha="right", va="center", color=HERE, fontweight="bold",
     )  # fmt: skip
 
 
-def _headings(axes: Axes, rows: list[RowResult], right: float) -> None:
+def _headings(axes: Axes, rows: list[RowResult]) -> None:
     """A line above each group but the first, and the group's name at its right end."""
     for place, row in enumerate(rows):
         if place == 0 or rows[place - 1].group != row.group:
             if place:
                 axes.axhline(place - 0.5, color="#D9DCE0", linewidth=0.8)
             axes.annotate(
-                row.group, (right, place), (-2, 0), textcoords="offset points", ha="right",
-                va="center", fontsize=8.5, color=FAINT,
+                row.group, (1, place - 0.46), (-4, 0), xycoords=axes.get_yaxis_transform(),
+                textcoords="offset points", ha="right", va="top", fontsize=8, color=FAINT,
             )  # fmt: skip
 
 

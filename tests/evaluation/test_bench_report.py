@@ -17,6 +17,7 @@ from airground.errors import InputError
 from evaluation import cli
 from evaluation.bench.load import LoadAverage
 from evaluation.bench.picture import bench_figure, curves_figure
+from evaluation.bench.publish import BEGIN, END, publish, with_table
 from evaluation.bench.report import (
     SCHEMA,
     BenchReport,
@@ -157,6 +158,28 @@ def test_markdown_is_a_table_of_even_width(report: BenchReport) -> None:
     lines = [line for line in markdown(report).splitlines() if line.startswith("| Stage")]
     assert len(lines) == 3
     assert {line.count("|") for line in lines} == {len(header(report)) + 1}
+
+
+def test_the_docs_get_the_table_and_the_pictures(report: BenchReport, tmp_path: Path) -> None:
+    results, docs = tmp_path / "results", tmp_path / "docs"
+    results.mkdir()
+    (docs / "pictures").mkdir(parents=True)
+    (results / "bench.json").write_text(report.to_json(), encoding="utf-8")
+    page = docs / "speed.md"
+    page.write_text(f"Before\n{BEGIN}\nold\n{END}\nAfter\n", encoding="utf-8")
+    publish(results, docs)
+    publish(results, docs)
+    said = page.read_text(encoding="utf-8")
+    assert said == f"Before\n{BEGIN}\n\n{markdown(report)}\n{END}\nAfter\n"
+    pictures = sorted(path.name for path in (docs / "pictures").iterdir())
+    assert pictures == ["bench.png", "bench_curves.png"]
+    with pytest.raises(InputError, match="has no lines"):
+        with_table("a page without marks", report)
+
+
+def test_the_page_of_the_docs_can_be_refreshed(report: BenchReport) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "speed.md").read_text(encoding="utf-8")
+    assert markdown(report) in with_table(page, report)
 
 
 def test_bars_end_at_the_medians_and_turn_dark_up_to_the_floor(report: BenchReport) -> None:
