@@ -42,6 +42,10 @@ def bench_figure(report: BenchReport) -> Figure:
     axes.tick_params(axis="y", length=0)
     axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.set_xlabel("time of one call [ms]")
+    axes.annotate(
+        "median", (1, -0.6), (34, 6), xycoords=axes.get_yaxis_transform(),
+        textcoords="offset points", ha="right", fontsize=9, color=HERE,
+    )  # fmt: skip
     axes.grid(axis="x")
     axes.set_title(_conditions(report), fontsize=9, fontweight="normal", color=FAINT)
     _legend(figure, axes, report)
