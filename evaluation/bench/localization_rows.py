@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -160,8 +161,7 @@ def particles_heading(material: Material) -> Work:
     return _particle_work(maps, update, len(poses), turned=True)
 
 
-def _particle_work(maps: Maps, update: object, count: int, turned: bool) -> Work:
-    assert callable(update)
+def _particle_work(maps: Maps, update: Callable[[], object], count: int, turned: bool) -> Work:
     cells = maps.aerial.filled_cells
     size = f"{count} particles, {cells} filled cells at {maps.aerial.cells_per_m:g} cells/m"
     return Work(update, size=size, floor=floors.particles(cells, count, turned))

@@ -37,7 +37,7 @@ class Bench(Verb, SensorWord, SeedWord):
     """Only these rows, by their names in JSON; "pipeline" is the real-time factor."""
     curves: bool = False
     """Also vary the sizes, one at a time, and fit how times grow."""
-    seconds_a_row: Annotated[float, arg(metavar="S")] = 6.0
+    seconds_a_row: Annotated[float, arg(metavar="S")] = 4.0
     """Time for each row with its peers, and for each curve."""
 
     def main(self) -> None:
