@@ -9,7 +9,7 @@ from pathlib import Path
 from airground.config import Config
 from airground.io.recording import Recording
 from evaluation.bench.curves import CURVES_BY_NAME, CurvePoint
-from evaluation.bench.material import Material, Played, play
+from evaluation.bench.material import Material, Played, compile_stages, play
 from evaluation.bench.memory import peak_memory_mib
 from evaluation.bench.probe import probe
 from evaluation.bench.row import Contender, Floor, Speed, Work
@@ -107,15 +107,16 @@ class Lane:
 
 
 def open_lane(path: Path, whole: bool) -> tuple[Lane, Opened]:
-    """Probe the cores and play the recording.
+    """Probe the cores before and after playing the recording.
 
     Args:
         path: A recording of both robots.
         whole: Play it to its end.
     """
     speed = probe()
-    recording = Recording.open(path)
+    recording, config = Recording.open(path), Config()
+    compile_stages(config)
     kept: list[tuple[Material, Played]] = []
-    peak = peak_memory_mib(lambda: kept.append(play(recording, Config(), whole)))
+    peak = peak_memory_mib(lambda: kept.append(play(recording, config, whole)))
     material, played = kept[0]
-    return Lane(material), Opened(speed, played, peak)
+    return Lane(material), Opened(speed.at_least(probe()), played, peak)

@@ -13,7 +13,7 @@ from airground.config import Config, paper
 from airground.core.belief import HeightMap
 from airground.localization.cost_map import overlay_at, overlay_turned, reach_of
 from airground.localization.height_map import aerial_height_map, ground_height_map
-from airground.localization.hypotheses import search_headings, search_positions
+from airground.localization.hypotheses import CostVolume, search_headings, search_positions
 from airground.localization.particles import resample, weights
 from evaluation.bench import floors
 from evaluation.bench.material import Material
@@ -82,7 +82,7 @@ class Maps:
         """Of the cost map."""
         return floors.cost_map(self.searched_cells(self.aerial.heights.shape))
 
-    def search(self) -> object:
+    def search(self) -> CostVolume:
         """The cost of every position."""
         return search_positions(
             self.aerial,

@@ -108,6 +108,12 @@ class Played:
     cpu_s: float
 
 
+def compile_stages(config: Config) -> None:
+    """Compile what the pipeline needs, so that it is in nobody's time or memory."""
+    warm_up(config)
+    warm_up_slam(np.random.default_rng(0))
+
+
 def play(recording: Recording, config: Config, whole: bool) -> tuple[Material, Played]:
     """Run the pipeline with SLAM over a recording, and keep what the rows need.
 
@@ -127,8 +133,6 @@ def play(recording: Recording, config: Config, whole: bool) -> tuple[Material, P
     front_ends = FrontEnds(mav, ground)
     pipeline = Pipeline(config, recording.mav, recording.ground, front_ends, rng)
     gathering = _Gathering(recording, config, pipeline)
-    warm_up(config)
-    warm_up_slam(np.random.default_rng(0))
     started, cpu = time.perf_counter(), time.process_time()
     for event in pipeline.run(recording.messages()):
         gathering.take(event)

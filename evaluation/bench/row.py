@@ -22,6 +22,13 @@ class Speed:
     bytes_per_s: float
     operations_per_s: float
 
+    def at_least(self, other: Speed) -> Speed:
+        """The higher of both, figure by figure."""
+        return Speed(
+            max(self.bytes_per_s, other.bytes_per_s),
+            max(self.operations_per_s, other.operations_per_s),
+        )
+
 
 @dataclass(frozen=True)
 class Floor:

@@ -126,6 +126,10 @@ def test_the_floor_is_the_slower_of_memory_and_arithmetic() -> None:
     assert Floor(1, 2) + Floor(3, 4) * 2 == Floor(7, 10)
 
 
+def test_all_cores_can_do_what_one_can() -> None:
+    assert Speed(3e9, 1e10).at_least(Speed(2e9, 5e10)) == Speed(3e9, 5e10)
+
+
 def test_floors_count_what_must_move() -> None:
     voxels = 376 * 240 * 150
     # A word of 4 bytes a voxel in and out; seven arrays and seven, eight times.
