@@ -19,10 +19,10 @@ FLOAT, COST, COUNTS, POINT = 4, 2, 4, 12
 def add_frame(pixels: int, planes: int) -> Floor:
     """One view against all planes (Sec. V).
 
-    A sample takes one interpolation along the row and half of one across rows, which
-    neighbouring columns share; then difference, truncation and sum.
+    The view has two columns for one of the reference: two interpolations across rows and one
+    along the row make a sample; then difference and sum.
     """
-    return Floor(2 * COST * pixels * planes, (3 + 3 + 3) * pixels * planes)
+    return Floor(2 * COST * pixels * planes, (3 * 3 + 2) * pixels * planes)
 
 
 def depth_map(pixels: int, planes: int, sides: int, semiglobal: bool) -> Floor:

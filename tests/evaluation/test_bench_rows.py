@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import time
+
 import numpy as np
 import pytest
 from scipy.spatial import KDTree
@@ -179,9 +182,15 @@ def test_peak_memory_counts_touched_pages_only() -> None:
 
 
 def test_the_load_of_others_leaves_out_our_own() -> None:
-    meter = LoadMeter()
+    meter, started, own = LoadMeter(), time.monotonic(), time.process_time()
+    while time.monotonic() < started + 0.5:
+        sum(range(1000))
     others = meter.other_cores()
-    assert others is None or others >= 0
+    busy = (time.process_time() - own) / (time.monotonic() - started)
+    if others is None:
+        pytest.skip("nobody counts the load here")
+    # The system counts in hundredths of a second.
+    assert 0 <= others <= (os.cpu_count() or 1) - busy + 0.2
 
 
 def test_unknown_rows_are_named() -> None:
