@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
-from evaluation.bench.report import BenchReport, LaneTiming, RowResult, Timing
+from evaluation.bench.report import BenchReport, CurveResult, LaneTiming, RowResult
 
 ABSENT = "-"
 
 
 def header(report: BenchReport) -> list[str]:
     """Titles of the columns."""
-    columns = ["stage [ms]"]
-    for speed in report.machine.speeds:
-        cores = "1 core" if speed.threads == 1 else f"{speed.threads} cores"
-        columns += [cores, "95 %", "n"]
-    return [*columns, "CPU", "paper", "target", "floor", "peer", "memory"]
+    lanes = [_cores(speed.threads) for speed in report.machine.speeds]
+    return ["stage [ms]", *lanes, "CPU", "paper", "target", "floor", "peer", "memory"]
 
 
 def body(report: BenchReport) -> list[list[str]]:
@@ -24,7 +22,7 @@ def body(report: BenchReport) -> list[list[str]]:
     lines = []
     for row in report.rows:
         first, *others = _peers(row) or [ABSENT]
-        lines.append([row.title, *_lanes(row.lanes), *_marks(row), first, _memory(row)])
+        lines.append([row.title, *map(_lane, row.lanes), *_marks(row), first, _memory(row)])
         width = len(lines[-1])
         lines += [[*[""] * (width - 2), other, ""] for other in others]
     return lines
@@ -65,23 +63,16 @@ def footnotes(report: BenchReport) -> list[str]:
 
 def print_table(report: BenchReport, console: Console) -> None:
     """Print what was measured, and under which conditions."""
-    shown = Table(title="medians [ms], beside the paper (Table I)", title_justify="left")
+    # Square brackets are units here, no markup.
+    shown = Table(title=Text("median, 95 % (calls) [ms]; the paper: Table I"), title_justify="left")
     for index, title in enumerate(header(report)):
         left = index == 0 or title == "peer"
-        shown.add_column(title, justify="left" if left else "right", overflow="fold")
+        shown.add_column(Text(title), justify="left" if left else "right", overflow="fold")
     for words in body(report):
-        shown.add_row(*words)
+        shown.add_row(*map(Text, words))
     console.print(shown)
-    for line in footnotes(report):
-        console.print(line, highlight=False)
-    for curve in report.curves:
-        times = ", ".join(
-            f"{point.value:g}: {_ms(point.timing.median_ms)}" for point in curve.points
-        )
-        console.print(
-            f"{curve.title} over {curve.parameter}: power {curve.exponent:.2f} ({times} ms)",
-            highlight=False,
-        )
+    for line in (*footnotes(report), *map(_growth, report.curves)):
+        console.print(line, highlight=False, markup=False)
 
 
 def markdown(report: BenchReport) -> str:
@@ -92,23 +83,25 @@ def markdown(report: BenchReport) -> str:
     if report.curves:
         text += ["", "| time of | over | power | medians [ms] |", "|---|---|---|---|"]
     for curve in report.curves:
-        times = ", ".join(f"{p.value:g}: {_ms(p.timing.median_ms)}" for p in curve.points)
-        text.append(f"| {curve.title} | {curve.parameter} | {curve.exponent:.2f} | {times} |")
+        words = (curve.title, curve.parameter, f"{curve.exponent:.2f}", _points(curve))
+        text.append(f"| {' | '.join(words)} |")
     return "\n".join(text) + "\n"
 
 
-def _lanes(lanes: list[LaneTiming]) -> list[str]:
-    words = []
-    for lane in lanes:
-        words += [_median(lane.timing), _ms(lane.timing.p95_ms), str(lane.timing.n)]
-    return words
+def _growth(curve: CurveResult) -> str:
+    return f"{curve.title} over {curve.parameter}: power {curve.exponent:.2f} ({_points(curve)} ms)"
 
 
-def _median(timing: Timing) -> str:
-    """The median; also the mean where single calls are much longer than most."""
-    median = _ms(timing.median_ms)
+def _points(curve: CurveResult) -> str:
+    return ", ".join(f"{p.value:g}: {_ms(p.timing.median_ms)}" for p in curve.points)
+
+
+def _lane(lane: LaneTiming) -> str:
+    """Median, 95th percentile and count; the mean where few calls are much longer than most."""
+    timing = lane.timing
+    words = f"{_ms(timing.median_ms)}, {_ms(timing.p95_ms)} ({timing.n})"
     skewed = timing.mean_ms > 1.2 * timing.median_ms
-    return f"{median} (mean {_ms(timing.mean_ms)})" if skewed else median
+    return f"{words}, mean {_ms(timing.mean_ms)}" if skewed else words
 
 
 def _marks(row: RowResult) -> list[str]:

@@ -137,7 +137,7 @@ def test_the_table_shows_paper_target_floor_and_peer(report: BenchReport) -> Non
     assert all(len(line) == len(header(report)) for line in lines)
     second = dict(zip(header(report), lines[1], strict=True))
     assert second["stage [ms]"] == "Stage b"
-    assert second["2 cores"] == "100"
+    assert second["2 cores"] == "100, 124 (5)"
     assert second["paper"] == "800 GPU"
     assert second["floor"] == "20"
     assert second["peer"] == "Other 40 (4.0x)"
@@ -151,7 +151,8 @@ def test_what_is_printed_states_the_conditions(report: BenchReport) -> None:
     assert "real-time factor 2.00" in said
     assert "other programs: 0.25 cores busy" in said
     assert "scikit-image not installed" in said
-    assert "power 1.00" in said
+    assert "voxels [millions]: power 1.00" in said
+    assert "stage [ms]" in said
 
 
 def test_markdown_is_a_table_of_even_width(report: BenchReport) -> None:
