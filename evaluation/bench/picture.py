@@ -7,7 +7,7 @@ import math
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
 from evaluation.bench.report import BenchReport, CurveResult, RowResult
 from evaluation.figures.style import FAINT, INK, PAPER, SERIES, styled
@@ -124,7 +124,10 @@ def _conditions(report: BenchReport) -> str:
 
 @styled
 def curves_figure(report: BenchReport) -> Figure:
-    """How each stage's time grows with one size: medians, and the power law that fits best."""
+    """How each stage's time grows with one size, and the powers of the laws that fit best.
+
+    Medians by the clock in front, of the processor time of all threads behind.
+    """
     curves = report.curves
     height = math.ceil(len(curves) / COLUMNS)
     figure = Figure(figsize=(2.75 * COLUMNS, 2.75 * height), layout="constrained")
@@ -133,40 +136,40 @@ def curves_figure(report: BenchReport) -> Figure:
         _draw_curve(axes, curve)
     for axes in grid.flat[len(curves) :]:
         axes.set_visible(False)
-    figure.supylabel("median [ms]", fontsize=10)
+    figure.supylabel("median [ms]: by the clock (blue), processor time (grey)", fontsize=10)
     return figure
 
 
 def _draw_curve(axes: Axes, curve: CurveResult) -> None:
-    values = np.array([point.value for point in curve.points])
-    times = np.array([point.timing.median_ms for point in curve.points])
-    middle = np.exp(np.log(times).mean() - curve.exponent * np.log(values).mean())
-    axes.plot(values, middle * values**curve.exponent, color=FAINT, linewidth=1.2, linestyle="--")
+    values = [point.value for point in curve.points]
+    times = [point.timing.median_ms for point in curve.points]
+    processor = [point.timing.cpu_median_ms or math.nan for point in curve.points]
+    axes.plot(values, processor, "o--", color=FAINT, markersize=4, linewidth=1.2)
     axes.plot(values, times, "o-", color=HERE, markersize=5, linewidth=1.6)
     axes.set_xscale("log")
     axes.set_yscale("log")
-    axes.xaxis.set_major_locator(FixedLocator(list(values)))
+    axes.xaxis.set_major_locator(FixedLocator(values))
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.set_ylim(10 ** (np.log10(times.min()) - 0.25), 10 ** (np.log10(times.max()) + 0.25))
-    ticks = sorted(
-        {_round(times.min()), _round(np.sqrt(times.min() * times.max())), _round(times.max())}
-    )
-    axes.yaxis.set_major_locator(FixedLocator(ticks))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    low, high = np.nanmin([*times, *processor]), np.nanmax([*times, *processor])
+    # At least one decade is shown, so that a flat curve looks flat; the top is for the words.
+    room = max(0.0, 1.0 - math.log10(high / low)) / 2
+    low, high = low / 10 ** (room + 0.1), high * 10 ** (room + 0.1)
+    axes.set_ylim(low, high * (high / low) ** 0.3)
+    axes.yaxis.set_major_locator(LogLocator(base=10, subs=(1, 3)))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.yaxis.set_minor_locator(NullLocator())
     axes.set_title(curve.title)
     axes.set_xlabel(curve.parameter)
     axes.grid()
-    axes.text(
-        0.05, 0.92, f"power {curve.exponent:.2f}", transform=axes.transAxes, color=HERE,
-        fontweight="bold", va="top",
-    )  # fmt: skip
-
-
-def _round(value: float) -> float:
-    return float(f"{value:.2g}")
+    for height, words, colour in (
+        (0.96, f"power {curve.exponent:.2f}", HERE),
+        (0.86, f"CPU {curve.cpu_exponent:.2f}", FAINT),
+    ):
+        axes.text(
+            0.04, height, words, transform=axes.transAxes, color=colour, fontweight="bold",
+            va="top",
+        )  # fmt: skip
 
 
 def _number(value: float) -> str:

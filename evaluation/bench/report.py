@@ -162,13 +162,18 @@ class CurvePointTiming(Part):
 
 
 class CurveResult(Part):
-    """How a stage grows: time = a value^exponent on the whole, with all cores."""
+    """How a stage grows: time = a value^exponent on the whole, with all cores.
+
+    `exponent` is of the clock's medians, `cpu_exponent` of the processor time's, which other
+    programs change little.
+    """
 
     name: str
     title: str
     parameter: str
     points: list[CurvePointTiming]
     exponent: float
+    cpu_exponent: float
 
 
 class BenchReport(Part):

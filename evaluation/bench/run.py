@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Protocol
-
-import numpy as np
 
 from airground.io.recording import Recording
 from evaluation.bench.curves import CURVES, Curve, CurvePoint, exponent
@@ -182,13 +181,15 @@ def timed_curve(curve: Curve, lane: AnyLane, seconds: float) -> CurveResult:
     turns = interleaved({point: partial(lane.take_turn, point) for point in points}, seconds)
     lane.clear()
     timings = {point.value: Timing.of(turns[point]) for point in points}
-    medians = np.array([timing.median_ms for timing in timings.values()])
     return CurveResult(
         name=curve.name,
         title=curve.title,
         parameter=curve.parameter,
         points=[CurvePointTiming(value=v, timing=timing) for v, timing in timings.items()],
-        exponent=exponent(curve.values, medians),
+        exponent=exponent(curve.values, [timing.median_ms for timing in timings.values()]),
+        cpu_exponent=exponent(
+            curve.values, [timing.cpu_median_ms or math.nan for timing in timings.values()]
+        ),
     )
 
 

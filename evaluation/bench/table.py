@@ -9,6 +9,8 @@ from rich.text import Text
 from evaluation.bench.report import BenchReport, CurveResult, LaneTiming, RowResult
 
 ABSENT = "-"
+BUSY_CORES = 0.2
+"""Where other programs keep more cores busy than this, the table says that it shows."""
 
 
 def header(report: BenchReport) -> list[str]:
@@ -44,6 +46,8 @@ def footnotes(report: BenchReport) -> list[str]:
     ]
     others = machine.other_cores
     busy = "unknown" if others is None else f"{others:.2f} cores busy"
+    if others is not None and others > BUSY_CORES:
+        lines.insert(0, "measured under load: times by the clock are too long, floors apart")
     lines.append(
         f"load average {machine.load_before.one_minute:.2f} before, "
         f"{machine.load_after.one_minute:.2f} after; other programs: {busy}"
@@ -81,15 +85,19 @@ def markdown(report: BenchReport) -> str:
     text = ["| " + " | ".join(line) + " |" for line in table]
     text += ["", *(f"- {line}" for line in footnotes(report))]
     if report.curves:
-        text += ["", "| time of | over | power | medians [ms] |", "|---|---|---|---|"]
+        text += ["", "| time of | over | power | of CPU time | medians [ms] |"]
+        text += ["|---|---|---|---|---|"]
     for curve in report.curves:
-        words = (curve.title, curve.parameter, f"{curve.exponent:.2f}", _points(curve))
-        text.append(f"| {' | '.join(words)} |")
+        powers = f"{curve.exponent:.2f} | {curve.cpu_exponent:.2f}"
+        text.append(f"| {curve.title} | {curve.parameter} | {powers} | {_points(curve)} |")
     return "\n".join(text) + "\n"
 
 
 def _growth(curve: CurveResult) -> str:
-    return f"{curve.title} over {curve.parameter}: power {curve.exponent:.2f} ({_points(curve)} ms)"
+    return (
+        f"{curve.title} over {curve.parameter}: power {curve.exponent:.2f}, of processor time "
+        f"{curve.cpu_exponent:.2f} ({_points(curve)} ms)"
+    )
 
 
 def _points(curve: CurveResult) -> str:

@@ -97,6 +97,7 @@ def report() -> BenchReport:
                 parameter="voxels [millions]",
                 points=[CurvePointTiming(value=v, timing=timing(20 * v)) for v in (1, 2, 4)],
                 exponent=1.0,
+                cpu_exponent=0.9,
             )
         ],
     )  # fmt: skip
@@ -150,9 +151,17 @@ def test_what_is_printed_states_the_conditions(report: BenchReport) -> None:
     said = out.getvalue()
     assert "real-time factor 2.00" in said
     assert "other programs: 0.25 cores busy" in said
+    assert "measured under load" in said
     assert "scikit-image not installed" in said
-    assert "voxels [millions]: power 1.00" in said
+    assert "voxels [millions]: power 1.00, of processor time 0.90" in said
     assert "stage [ms]" in said
+
+
+def test_an_idle_machine_needs_no_excuse(report: BenchReport) -> None:
+    idle = report.machine.model_copy(update={"other_cores": 0.02})
+    said = markdown(report.model_copy(update={"machine": idle}))
+    assert "under load" not in said
+    assert "other programs: 0.02 cores busy" in said
 
 
 def test_markdown_is_a_table_of_even_width(report: BenchReport) -> None:
@@ -200,7 +209,7 @@ def test_the_picture_names_rows_groups_and_conditions(report: BenchReport) -> No
 
 
 def test_curves_show_their_power(report: BenchReport) -> None:
-    assert "power 1.00" in texts(curves_figure(report))
+    assert {"power 1.00", "CPU 0.90"} <= set(texts(curves_figure(report)))
 
 
 def test_an_unknown_row_is_one_clear_line(capsys: pytest.CaptureFixture[str]) -> None:
