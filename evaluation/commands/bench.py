@@ -4,33 +4,70 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import arg
 
-from evaluation.commands.words import SeedWord, SensorWord, SetupWords, Verb
+from evaluation.commands.words import SeedWord, SensorWord, Verb, in_range
+
+if TYPE_CHECKING:
+    from evaluation.bench.report import BenchReport
 
 SCENE = "tiny"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bench(Verb, SetupWords, SensorWord, SeedWord):
+class Bench(Verb, SensorWord, SeedWord):
     """Time the pipeline's stages on this machine (Table I).
 
-    Runs the pipeline twice over one recording, first to compile its kernels, and shows the
-    medians of the second run beside the paper's averages.
+    Each stage runs on one core and on all, in turns with what other libraries offer, on
+    the data of one recording; beside it stand the paper's figure and the least time that
+    this machine's memory and arithmetic allow. docs/speed.md says how to read it.
     """
 
     recording: Annotated[
         Path | None, arg(metavar="DIR", help_behavior_hint=f"(default: a new one of {SCENE})")
     ] = None
     """A folder that simulate has written."""
+    out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(optional)")] = None
+    """Folder to make for bench.json, bench.md and the pictures; it must not exist."""
+    json: bool = False
+    """Print the figures as JSON, and nothing else, on stdout."""
+    rows: Annotated[str, arg(metavar="A,B", help_behavior_hint="(default: all)")] = ""
+    """Only these rows, by their names in JSON; "pipeline" is the real-time factor."""
+    curves: bool = False
+    """Also vary the sizes, one at a time, and fit how times grow."""
+    seconds_a_row: Annotated[float, arg(metavar="S")] = 4.0
+    """Time for each row with its peers, and for each curve."""
 
     def main(self) -> None:
         import tempfile
 
-        with tempfile.TemporaryDirectory(prefix="airground-bench-") as scratch:
-            self._bench(self.recording or self._record(Path(scratch) / SCENE))
+        from rich.console import Console
+
+        from evaluation.bench.rows import checked_names
+        from evaluation.bench.run import run_benchmark
+        from evaluation.bench.table import print_table
+        from evaluation.output import check_free
+
+        names = checked_names([name for name in self.rows.split(",") if name])
+        seconds = in_range("--seconds-a-row", self.seconds_a_row, low=0.0, high=3600)
+        if self.out is not None:
+            check_free(self.out)
+        with (
+            tempfile.TemporaryDirectory(prefix="airground-bench-") as scratch,
+            Console(stderr=True).status("starting") as status,
+        ):
+            path = self.recording
+            if path is None:
+                status.update(f"recording {SCENE}")
+                path = self._record(Path(scratch) / SCENE)
+            report = run_benchmark(path, names, self.workers(), seconds, self.curves, status.update)
+        self._write(report)
+        if self.json:
+            print(report.to_json(), end="")
+        else:
+            print_table(report, Console())
 
     def _record(self, path: Path) -> Path:
         from sim.presets import sensor_preset
@@ -41,23 +78,18 @@ class Bench(Verb, SetupWords, SensorWord, SeedWord):
         record(load_scene(SCENE), seed, sensors, path, workers=self.workers())
         return path
 
-    def _bench(self, path: Path) -> None:
-        from rich.console import Console
-        from rich.table import Table
+    def _write(self, report: BenchReport) -> None:
+        if self.out is None:
+            return
+        from evaluation.bench.picture import bench_figure, curves_figure
+        from evaluation.bench.table import markdown
+        from evaluation.figures.style import save_figure
+        from evaluation.output import fresh_folder
 
-        from airground.io.recording import Recording
-        from evaluation.report_tables import timing_table
-        from evaluation.run import run_recording
-        from sim.truth import Truth
-
-        setup, seed = self.setup(), self.checked_seed()
-        recording, truth = Recording.open(path), Truth.open(path)
-        for _ in range(2):
-            result = run_recording(recording, truth, setup, seed)
-        table = timing_table(result.table)
-        shown = Table(title=f"{recording.scene}, {self.workers()} threads", title_justify="left")
-        for column in table.header:
-            shown.add_column(column)
-        for row in table.rows:
-            shown.add_row(*row)
-        Console().print(shown)
+        with fresh_folder(self.out) as folder:
+            (folder / "bench.json").write_text(report.to_json(), encoding="utf-8")
+            (folder / "bench.md").write_text(markdown(report), encoding="utf-8")
+            if report.rows:
+                save_figure(bench_figure(report), folder, "bench")
+            if report.curves:
+                save_figure(curves_figure(report), folder, "curves")

@@ -1,0 +1,238 @@
+"""Section V's stages as work: on the views, depth maps and voxels of one surface."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.config import Config
+from airground.core.camera import PinholeCamera
+from airground.core.surface import DepthMap
+from airground.dense.depth_refinement import depth_from_costs
+from airground.dense.distance_field import MAX_DEPTH_MAPS, FieldHistogram
+from airground.dense.fusion import Fusion
+from airground.dense.plane_sweep import PlaneSweep, inverse_depth_planes
+from airground.dense.ray_casting import cast_surface, surface_cloud
+from airground.dense.scene_extent import scene_extent
+from airground.dense.view_selection import AFTER, BEFORE, PosedImage
+from airground.dense.volume import Volume
+from airground.errors import InputError
+from evaluation.bench import floors
+from evaluation.bench.material import Material
+from evaluation.bench.row import Work
+
+
+@dataclass
+class Sweep:
+    """One depth map under construction, view after view as the pipeline adds them.
+
+    Attributes:
+        camera: Of the images.
+        reference: The view that the depth map is of.
+        views: Those that are compared with it.
+        config: The pipeline's parameters.
+    """
+
+    camera: PinholeCamera
+    reference: PosedImage
+    views: list[PosedImage]
+    config: Config
+    _sweep: PlaneSweep | None = None
+    _added: int = 0
+    _planes: NDArray[np.float64] = field(init=False)
+
+    def __post_init__(self) -> None:
+        before = [view for view in self.views if view.stamp_ns < self.reference.stamp_ns]
+        extent = scene_extent(self.reference, before or self.views, self.camera)
+        if extent is None:
+            raise InputError("the views show too little texture to tell the depth of the scene")
+        self._planes = inverse_depth_planes(
+            extent.near_m, extent.far_m, self.config.plane_sweep.hypotheses
+        )
+
+    @property
+    def sides(self) -> int:
+        return 2 if self.config.view_selection.both_sides else 1
+
+    @property
+    def pixels(self) -> int:
+        """Of the depth map: half of the image's a side."""
+        return (self.camera.width // 2) * (self.camera.height // 2)
+
+    @property
+    def size(self) -> str:
+        return (
+            f"{self.camera.width} x {self.camera.height} px, "
+            f"{self.config.plane_sweep.hypotheses} hypotheses"
+        )
+
+    def ready(self) -> None:
+        """Begin anew when all views are in."""
+        if self._sweep is None or self._added == len(self.views):
+            self._sweep = PlaneSweep(
+                self.reference.image,
+                self.camera,
+                self.reference.T_mav_camera,
+                self._planes,
+                self.config.plane_sweep,
+                self.sides,
+            )
+            self._added = 0
+
+    def add_next(self) -> None:
+        """Compare the next view with the reference."""
+        assert self._sweep is not None
+        view = self.views[self._added]
+        side = AFTER if view.stamp_ns > self.reference.stamp_ns and self.sides == 2 else BEFORE
+        self._sweep.add(view.image, view.T_mav_camera, side)
+        self._added += 1
+
+    def complete(self) -> PlaneSweep:
+        """The sweep with all its views."""
+        self._sweep = None
+        self.ready()
+        for _ in self.views:
+            self.add_next()
+        assert self._sweep is not None
+        return self._sweep
+
+
+def sweep_of(material: Material, config: Config) -> Sweep:
+    """The sweep for the depth map in the middle of the surface."""
+    return Sweep(material.mav_camera, material.reference, material.views, config)
+
+
+def add_frame(material: Material) -> Work:
+    sweep = sweep_of(material, material.config)
+    floor = floors.add_frame(sweep.pixels, sweep.config.plane_sweep.hypotheses)
+    return Work(sweep.add_next, sweep.ready, sweep.size, floor)
+
+
+def depth_map(material: Material) -> Work:
+    sweep = sweep_of(material, material.config)
+    parameters = sweep.config.plane_sweep
+    finished = sweep.complete()
+    floor = floors.depth_map(
+        sweep.pixels, parameters.hypotheses, sweep.sides, parameters.smoothing == "semiglobal"
+    )
+    size = f"{sweep.size}, {len(sweep.views)} views"
+    return Work(lambda: depth_from_costs(finished, parameters), size=size, floor=floor)
+
+
+@dataclass
+class VoxelWork:
+    """The volume of one surface and what is computed in it, with memory kept between calls.
+
+    Attributes:
+        depth_maps: That are fused.
+        config: The pipeline's parameters.
+    """
+
+    depth_maps: list[DepthMap]
+    config: Config
+    histogram: FieldHistogram = field(init=False)
+    fusion: Fusion = field(init=False)
+
+    def __post_init__(self) -> None:
+        fusion = self.config.fusion
+        self.fusion = Fusion(fusion.data_weight, fusion.iterations, fusion.bins)
+        self.histogram = FieldHistogram(self.volume(), fusion.truncation_m, fusion.bins)
+
+    @property
+    def reference(self) -> DepthMap:
+        return self.depth_maps[len(self.depth_maps) // 2]
+
+    @property
+    def voxels(self) -> int:
+        return math.prod(self.config.fusion.voxels)
+
+    @property
+    def pixels(self) -> int:
+        return self.config.fusion.voxels[0] * self.config.fusion.voxels[1]
+
+    @property
+    def size(self) -> str:
+        return " x ".join(map(str, self.config.fusion.voxels)) + " voxels"
+
+    def volume(self) -> Volume:
+        """What all depth maps saw."""
+        fusion = self.config.fusion
+        return Volume.around(self.depth_maps, self.reference, fusion.voxels, fusion.truncation_m)
+
+    def empty(self, volume: Volume | None = None) -> None:
+        """A new histogram in the old one's memory, over the same volume where none is given."""
+        fusion, old = self.config.fusion, self.histogram
+        self.histogram = FieldHistogram(
+            volume or old.volume, fusion.truncation_m, fusion.bins, old.counts
+        )
+
+    def make_room(self) -> None:
+        """A new histogram when this one is full."""
+        if self.histogram.depth_maps >= MAX_DEPTH_MAPS:
+            self.empty()
+
+    def add_one(self) -> None:
+        """The distance field of a depth map, another one each time."""
+        self.histogram.add(self.depth_maps[self.histogram.depth_maps % len(self.depth_maps)])
+
+    def add_all(self, volume: Volume | None = None) -> None:
+        """The distance fields of all depth maps."""
+        self.empty(volume)
+        for depth_map in self.depth_maps:
+            self.histogram.add(depth_map)
+
+    def fuse(self) -> NDArray[np.float32]:
+        return self.fusion.fuse(self.histogram.counts)
+
+    def cast(self, phi: NDArray[np.float32]) -> object:
+        """The points of the fused surface."""
+        fusion, volume = self.config.fusion, self.histogram.volume
+        depth, normals = cast_surface(
+            volume,
+            phi,
+            self.histogram.counts,
+            fusion.min_observations,
+            fusion.truncation_m,
+            fusion.bins,
+        )
+        return surface_cloud(volume, depth, normals, self.reference)
+
+    def all_of_it(self) -> object:
+        """From depth maps to points."""
+        self.add_all(self.volume())
+        return self.cast(self.fuse())
+
+
+def distance_field(material: Material) -> Work:
+    work = VoxelWork(material.depth_maps, material.config)
+    return Work(work.add_one, work.make_room, work.size, floors.distance_field(work.voxels))
+
+
+def fusion(material: Material) -> Work:
+    work = VoxelWork(material.depth_maps, material.config)
+    work.add_all()
+    parameters = work.config.fusion
+    floor = floors.fusion(work.voxels, parameters.iterations, parameters.bins)
+    return Work(work.fuse, size=f"{work.size}, {parameters.iterations} iterations", floor=floor)
+
+
+def ray_cast(material: Material) -> Work:
+    work = VoxelWork(material.depth_maps, material.config)
+    work.add_all()
+    phi = work.fuse()
+    return Work(
+        lambda: work.cast(phi), size=work.size, floor=floors.ray_cast(work.voxels, work.pixels)
+    )
+
+
+def surface(material: Material) -> Work:
+    """Fields, fusion and casting of one surface: what other libraries do in one go."""
+    work = VoxelWork(material.depth_maps, material.config)
+    parameters, count = work.config.fusion, len(work.depth_maps)
+    floor = floors.distance_field(work.voxels) * count
+    floor += floors.fusion(work.voxels, parameters.iterations, parameters.bins)
+    floor += floors.ray_cast(work.voxels, work.pixels)
+    return Work(work.all_of_it, size=f"{work.size}, {count} depth maps", floor=floor)

@@ -1,0 +1,104 @@
+"""The least that each row must move and compute: a mark that no program passes.
+
+Counted are data that fit no cache (cost volumes, voxels), once in and once out of every pass
+that the method cannot do without, and the arithmetic of the method's inner loop. What a
+cache can hold, indices, conversions and comparisons are left out, so that the floor is lower
+than what can be reached, never higher.
+"""
+
+from __future__ import annotations
+
+import math
+
+from evaluation.bench.row import Floor
+
+FLOAT, COST, COUNTS, POINT = 4, 2, 4, 12
+"""Bytes of a float32, of a uint16 cost, of a voxel's packed histogram, of a point."""
+
+
+def add_frame(pixels: int, planes: int) -> Floor:
+    """One view against all planes (Sec. V).
+
+    The view has two columns for one of the reference: two interpolations across rows and one
+    along the row make a sample; then difference and sum.
+    """
+    return Floor(2 * COST * pixels * planes, (3 * 3 + 2) * pixels * planes)
+
+
+def depth_map(pixels: int, planes: int, sides: int, semiglobal: bool) -> Floor:
+    """Window means over the sides, smoothing along four directions, and the minimum.
+
+    Running sums take four operations a side whatever the window. Smoothing needs a pass along
+    rows and one along columns: each reads the means, and reads and writes the sums.
+    """
+    samples = pixels * planes
+    window = Floor(COST * (sides + 1) * samples, (4 * sides + 2) * samples)
+    smoothing = Floor(2 * 3 * COST * samples, 4 * 6 * samples)
+    pick = Floor(COST * samples, samples)
+    return window + smoothing + pick if semiglobal else window + pick
+
+
+def distance_field(voxels: int) -> Floor:
+    """One depth map into the histogram: a projection, a difference and a vote a voxel."""
+    return Floor(2 * COUNTS * voxels, 14 * voxels)
+
+
+def fusion(voxels: int, iterations: int, bins: int) -> Floor:
+    """Eq. 1 by primal-dual steps (Chambolle and Pock 2011).
+
+    The dual step reads phi and reads and writes three fields; the primal step reads these
+    and the counts, reads and writes phi, and writes its extrapolation. The prox takes a product,
+    two sums, a minimum and a maximum a bin.
+    """
+    dual = Floor(7 * FLOAT * voxels, 17 * voxels)
+    primal = Floor((6 * FLOAT + COUNTS) * voxels, (8 + 5 * bins) * voxels)
+    return (dual + primal) * iterations
+
+
+def ray_cast(voxels: int, pixels: int) -> Floor:
+    """Every voxel's sign once, and a crossing with its normal a pixel."""
+    return Floor(FLOAT * voxels + (FLOAT + POINT) * pixels, 2 * voxels + 40 * pixels)
+
+
+def transforms(cells: int, count: int) -> Floor:
+    """Real Fourier transforms of maps that stay in the cache: 2.5 n log2 n each."""
+    return Floor(0, 2.5 * cells * math.log2(cells) * count)
+
+
+def cost_map(cells: int) -> Floor:
+    """Eq. 2 at all offsets by masked correlations.
+
+    Six transforms of values, squares and masks and three back: count, sum and sum of squares
+    of the differences; six complex products.
+
+    Args:
+        cells: Of the searched square, widened by the aerial map.
+    """
+    return transforms(cells, 9) + Floor(0, 6 * 6 * cells / 2)
+
+
+def heading_search(cells: int, headings: int) -> Floor:
+    """The same for many headings; the ground's three transforms are shared."""
+    return transforms(cells, 3) + (transforms(cells, 6) + Floor(0, 18 * cells)) * headings
+
+
+def particles(cells: int, count: int, turned: bool) -> Floor:
+    """Six sums over the overlap at each particle, heights and mask interpolated.
+
+    Args:
+        cells: Filled cells of the aerial map.
+        count: Particles.
+        turned: Each has a heading: then every cell has its own place and weights.
+    """
+    each = (7 + 7 + 1) + 10 + (8 + 6 if turned else 0)
+    return Floor(0, each * cells * count)
+
+
+def height_map(points: int, cells: int) -> Floor:
+    """Every point read once; every cell written, and read again for its holes."""
+    return Floor(POINT * points + 2 * FLOAT * cells, 6 * points)
+
+
+def added_points(points: int) -> Floor:
+    """Points moved, and written beside those that were there."""
+    return Floor(2 * POINT * points, 18 * points)

@@ -1,0 +1,185 @@
+"""What a user would take from another library instead, on the same data.
+
+Each peer is used as its documentation shows, with every core it takes by itself. Where it does
+less or more than the row, `rows.py` says so beside it.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import open3d as o3d
+from numpy.typing import NDArray
+
+from airground.config import paper
+from airground.core.cloud import PointCloud
+from airground.core.surface import DepthMap
+from airground.dense.plane_sweep import halved, inverse_depth_planes
+from airground.dense.scene_extent import scene_extent
+from airground.dense.volume import Volume
+from evaluation.bench.localization_rows import Maps, paper_sized
+from evaluation.bench.map_rows import start_of
+from evaluation.bench.material import Material
+from evaluation.bench.row import Work
+
+BLOCK = 8
+FIRST_BLOCKS = 20_000
+NEIGHBOURS = 10
+
+
+def masked_correlation(material: Material) -> Work:
+    """scikit-image: normalized correlation of masked images (Padfield 2012), and its peak."""
+    from skimage.registration import phase_cross_correlation
+
+    maps = Maps(material, paper_sized(), material.heading)
+    ground, ground_mask = _filled(maps.ground.heights)
+    aerial, aerial_mask = _filled(maps.aerial.heights)
+
+    def register() -> object:
+        return phase_cross_correlation(
+            ground,
+            aerial,
+            reference_mask=ground_mask,
+            moving_mask=aerial_mask,
+            overlap_ratio=maps.config.localization.min_overlap,
+        )
+
+    return Work(register)
+
+
+def match_template(material: Material) -> Work:
+    """OpenCV: the aerial map, masked, as a template on the ground map."""
+    maps = Maps(material, paper_sized(), material.heading)
+    ground, _ = _filled(maps.ground.heights)
+    aerial, mask = _filled(maps.aerial.heights)
+    weight = mask.astype(np.float32)
+    return Work(lambda: cv2.matchTemplate(ground, aerial, cv2.TM_CCOEFF_NORMED, mask=weight))
+
+
+def _filled(heights: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    """Heights with their mean in holes, and where there are some."""
+    known = np.isfinite(heights)
+    return np.where(known, heights, heights[known].mean()).astype(np.float32), known
+
+
+def plane_by_plane(material: Material) -> Work:
+    """OpenCV: warp the view by each plane's homography, difference, truncate, add."""
+    config = material.config.plane_sweep
+    camera = material.mav_camera
+    small = camera.halved()
+    reference, view = material.reference, material.views[-1]
+    extent = scene_extent(reference, material.views, camera)
+    assert extent is not None
+    T_view_reference = view.T_mav_camera.inverse() @ reference.T_mav_camera
+    K, inverse = small.matrix(), np.linalg.inv(small.matrix())
+    normal = np.array([0.0, 0.0, 1.0])
+    homographies = [
+        K
+        @ (T_view_reference.rotation + np.outer(T_view_reference.translation, normal) / z)
+        @ inverse
+        for z in inverse_depth_planes(extent.near_m, extent.far_m, config.hypotheses)
+    ]
+    grey = halved(reference.image)
+    size = small.width, small.height
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    costs = np.zeros((config.hypotheses, small.height, small.width), np.float32)
+
+    def add() -> None:
+        image = halved(view.image)
+        for plane, homography in enumerate(homographies):
+            warped = cv2.warpPerspective(image, homography, size, flags=flags)
+            difference = np.minimum(cv2.absdiff(warped, grey), np.float32(config.truncation))
+            cv2.accumulate(difference, costs[plane])
+
+    return Work(add)
+
+
+def integrate_one(material: Material) -> Work:
+    """Open3D: one depth map into a truncated signed distance field of hashed blocks."""
+    grid = _Grid(material)
+    return Work(lambda: grid.integrate(material.reference_depth))
+
+
+def integrate_and_extract(material: Material) -> Work:
+    """Open3D: all depth maps of a surface, then its points.
+
+    Not `ray_cast`: on a new grid of Open3D 0.20 its first call allocates too little, and finds
+    no surface.
+    """
+
+    def build() -> object:
+        grid = _Grid(material)
+        for depth_map in material.depth_maps:
+            grid.integrate(depth_map)
+        return grid.extract()
+
+    return Work(build)
+
+
+class _Grid:
+    """Open3D's distance field with voxels as wide as ours are in the middle of the volume."""
+
+    def __init__(self, material: Material) -> None:
+        fusion = material.config.fusion
+        volume = Volume.around(
+            material.depth_maps, material.reference_depth, fusion.voxels, fusion.truncation_m
+        )
+        self._far_m = volume.far_m + 1.0
+        middle_m = 0.5 * (volume.near_m + volume.far_m)
+        voxel_m = middle_m / volume.camera.fx
+        self._truncation_voxels = fusion.truncation_m / voxel_m
+        self._weight = float(fusion.min_observations)
+        self._grid = o3d.t.geometry.VoxelBlockGrid(
+            attr_names=("tsdf", "weight"),
+            attr_dtypes=(o3d.core.float32,) * 2,
+            attr_channels=[o3d.core.SizeVector([1])] * 2,
+            voxel_size=voxel_m,
+            block_resolution=BLOCK,
+            block_count=FIRST_BLOCKS,
+        )
+
+    def integrate(self, depth_map: DepthMap) -> None:
+        seen = np.nan_to_num(depth_map.depth, nan=0.0)
+        depth = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(seen))
+        intrinsics = o3d.core.Tensor.from_numpy(depth_map.camera.matrix())
+        extrinsics = o3d.core.Tensor.from_numpy(depth_map.T_mav_camera.inverse().matrix())
+        reach = (1.0, self._far_m, self._truncation_voxels)
+        blocks = self._grid.compute_unique_block_coordinates(depth, intrinsics, extrinsics, *reach)
+        self._grid.integrate(blocks, depth, intrinsics, extrinsics, *reach)
+
+    def extract(self) -> o3d.t.geometry.PointCloud:
+        return self._grid.extract_point_cloud(self._weight - 0.5)
+
+
+def open3d_icp(material: Material) -> Work:
+    """Open3D: crop, thin and estimate normals, then point-to-plane ICP from the same start."""
+    settings = paper().refinement
+    registration = o3d.pipelines.registration
+    aerial, ground = _cloud(material.surface.cloud_mav), _cloud(material.ground_cloud)
+    start = start_of(material).matrix()
+    criteria = registration.ICPConvergenceCriteria(max_iteration=settings.iterations)
+    knn = o3d.geometry.KDTreeSearchParamKNN(NEIGHBOURS)
+
+    def align() -> object:
+        source = aerial.voxel_down_sample(settings.voxel_m)
+        box = o3d.geometry.PointCloud(source).transform(start).get_axis_aligned_bounding_box()
+        low, high = box.get_min_bound(), box.get_max_bound()
+        margin = np.full(3, settings.max_distance_m)
+        box = o3d.geometry.AxisAlignedBoundingBox(low - margin, high + margin)
+        target = ground.crop(box).voxel_down_sample(settings.voxel_m)
+        target.estimate_normals(knn)
+        return registration.registration_icp(
+            source,
+            target,
+            settings.max_distance_m,
+            start,
+            registration.TransformationEstimationPointToPlane(),
+            criteria,
+        )
+
+    return Work(align)
+
+
+def _cloud(cloud: PointCloud) -> o3d.geometry.PointCloud:
+    points = o3d.utility.Vector3dVector(cloud.points.astype(np.float64))
+    return o3d.geometry.PointCloud(points)
