@@ -105,7 +105,8 @@ def sums_at_positions(
     return sums
 
 
-@njit(cache=True, error_model="numpy", fastmath=KEEPS_NAN)
+# Inlined: called, it rounded otherwise once the caller came from the cache.
+@njit(cache=True, inline="always", error_model="numpy", fastmath=KEEPS_NAN)
 def _add_row(
     heights: NDArray,
     filled: NDArray,
