@@ -186,16 +186,7 @@ class KeyframeSlam:
         """Adjust the whole map and go on from its newest keyframe."""
         before = self.map.keyframes[-1].state.pose()
         self.adjuster.adjust_all(self.inertial)
-        self._follow_newest(before)
-
-    def _follow_newest(self, T_map_before: SE3) -> None:
-        """Go on from the newest keyframe, which moved."""
-        newest = self.map.keyframes[-1].state
-        self.state = replace(
-            self.state.moved(newest.pose() @ T_map_before.inverse()),
-            gyro_bias=newest.gyro_bias,
-            accelerometer_bias=newest.accelerometer_bias,
-        )
+        self.state = self.state.following(before, self.map.keyframes[-1].state)
 
     def make_upright(self, scale: float, R_new_map: NDArray[np.float64]) -> None:
         """Scale the map to metres and turn it so that z points up."""
@@ -207,14 +198,9 @@ class KeyframeSlam:
     def make_inertial(self, alignment: InertialAlignment) -> None:
         """Make the map metric and upright; from now on the accelerometer counts."""
         self.make_upright(alignment.scale, alignment.R_map_v)
-        newest = self.map.keyframes[-len(alignment.velocities) :]
-        for n, keyframe in enumerate(newest):
-            keyframe.state = replace(
-                keyframe.state,
-                velocity=alignment.velocities[n],
-                gyro_bias=alignment.gyro_biases[n],
-                accelerometer_bias=alignment.accelerometer_biases[n],
-            )
+        self.map.set_motion(
+            alignment.velocities, alignment.gyro_biases, alignment.accelerometer_biases
+        )
         self.state = self.map.keyframes[-1].state
         self.inertial = True
         self.adjust_all()
@@ -348,7 +334,7 @@ class KeyframeSlam:
         before = adjusted.pose()
         closed = not self._mapper.found_old and self._loops.close(frame.depth, self.inertial)
         if closed:
-            self._follow_newest(before)
+            self.state = self.state.following(before, self.map.keyframes[-1].state)
         # Until poses are given out, scale and vertical are sought by all keyframes.
         if len(self.path):
             self._culler.cull(self.inertial)

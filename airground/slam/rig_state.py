@@ -68,3 +68,11 @@ class RigState:
             position=T_new_map @ self.position,
             velocity=T_new_map.rotation @ self.velocity,
         )
+
+    def following(self, T_map_before: SE3, newest: RigState) -> RigState:
+        """The same state after the newest keyframe moved from a pose to where it is now."""
+        return replace(
+            self.moved(newest.pose() @ T_map_before.inverse()),
+            gyro_bias=newest.gyro_bias,
+            accelerometer_bias=newest.accelerometer_bias,
+        )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -172,6 +172,19 @@ class SparseMap:
         z = (T_map_camera.inverse() @ self.positions[ids])[:, 2]
         low, high = np.percentile(z, [DEPTH_RANGE_PERCENT, 100 - DEPTH_RANGE_PERCENT])
         return (float(low), float(high)) if low > 0 else None
+
+    def set_motion(
+        self, velocities: NDArray, gyro_biases: NDArray, accelerometer_biases: NDArray
+    ) -> None:
+        """Give the newest keyframes (K, 3) velocities and biases each."""
+        newest = self.keyframes[-len(velocities) :]
+        for n, keyframe in enumerate(newest):
+            keyframe.state = replace(
+                keyframe.state,
+                velocity=velocities[n],
+                gyro_bias=gyro_biases[n],
+                accelerometer_bias=accelerometer_biases[n],
+            )
 
     def move(self, scale: float, rotation: NDArray[np.float64], lever: NDArray[np.float64]) -> None:
         """Scale and turn the whole map about its origin, as `RigState.scaled` does a state."""
