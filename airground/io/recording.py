@@ -153,6 +153,10 @@ class Recording:
         for _, bundle in heapq.merge(*streams, key=lambda stamped_bundle: stamped_bundle[0]):
             yield from bundle
 
+    def calibration(self, robot: Source) -> RobotCalibration:
+        """What the pipeline is told about a robot's sensors."""
+        return self.mav if robot == Source.MAV else self.ground
+
     def stamps_ns(self, robot: Source) -> NDArray[np.int64]:
         """(N,) stamps of a robot's images [ns]."""
         return self.mav_camera_stamps if robot == Source.MAV else self.ground_camera_stamps

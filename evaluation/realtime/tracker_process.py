@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from airground.core.cloud import Source
-from airground.core.messages import RobotCalibration
 from airground.core.trajectory import Trajectory
 from airground.errors import AirgroundError
 from airground.io.recording import Recording
@@ -97,7 +96,7 @@ def _report(task: TrackerTask, pipe: Connection) -> TrackerReport:
     recording = Recording.open(task.recording)
     truth = Truth.open(task.recording)
     watched = front_ends_for(task.setup, recording, truth, front_end_rng(task.seed))
-    tracker = RobotTracker(task.robot, calibration(recording, task.robot), watched.of(task.robot))
+    tracker = RobotTracker(task.robot, recording.calibration(task.robot), watched.of(task.robot))
     radio = None
     if task.radio is not None:
         radio = Radio(task.radio, np.random.default_rng([task.seed, 1]))
@@ -120,11 +119,6 @@ def _report(task: TrackerTask, pipe: Connection) -> TrackerReport:
         sender.most_under_way,
         peak_memory_mib(),
     )
-
-
-def calibration(recording: Recording, robot: Source) -> RobotCalibration:
-    """What a robot is told about its sensors."""
-    return recording.mav if robot == Source.MAV else recording.ground
 
 
 def _end_with_parent() -> None:
