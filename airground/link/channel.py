@@ -32,7 +32,7 @@ class Sender:
         self._socket: zmq.Socket[bytes] = zmq.Context.instance().socket(zmq.DEALER)
         # The bound is `capacity`: the last message of all must get through beyond it.
         self._socket.set_hwm(0)
-        self._socket.linger = LAST_WORDS_MS
+        self._socket.setsockopt(zmq.LINGER, LAST_WORDS_MS)
         self._socket.connect(address)
         self._capacity = capacity
         self.under_way = self.most_under_way = 0
@@ -65,7 +65,7 @@ class Receiver:
     def __init__(self) -> None:
         self._socket: zmq.Socket[bytes] = zmq.Context.instance().socket(zmq.DEALER)
         self._socket.set_hwm(0)
-        self._socket.linger = 0
+        self._socket.setsockopt(zmq.LINGER, 0)
         self.address = f"{LOOPBACK}:{self._socket.bind_to_random_port(LOOPBACK)}"
 
     def wait(self, timeout_s: float) -> bool:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from airground.io.recording import Recording
+from evaluation.realtime.live_summary import STAGE
 from evaluation.realtime.lived import Lived, Playback
 from evaluation.realtime.tracker_process import TrackerReport
 from evaluation.row_writer import RowWriter
 
-STAGE = "realtime"
 
-
-def add_live_rows(out: RowWriter, lived: Lived, playback: Playback) -> None:
+def add_live_rows(out: RowWriter, recording: Recording, lived: Lived, playback: Playback) -> None:
     """Write how a live run went.
 
     Latencies count from the moment when an image was due: `*_posed_ms` to its pose,
@@ -30,6 +30,7 @@ def add_live_rows(out: RowWriter, lived: Lived, playback: Playback) -> None:
     for latency_ms in lived.aligned_ms:
         out.add(STAGE, "aligned_ms", latency_ms, "ms")
     out.add(STAGE, "rate", playback.rate, "")
+    out.add(STAGE, "recorded_s", recording.duration_s, "s")
     out.add(STAGE, "wall_s", lived.wall_s, "s")
     out.add(STAGE, "mapper_processor_share", lived.processor_s / lived.wall_s, "")
     out.add(STAGE, "mapper_peak_memory_mib", lived.peak_memory_mib, "MiB")

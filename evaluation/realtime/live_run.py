@@ -71,7 +71,7 @@ def run_live(
             lived.reports[robot.robot] = robot.report()
             lived.late_ns[robot.robot] = robot.stream.late_ns
         measure.pipeline.mapping.correct_ground(streams[Source.GROUND].final)
-    add_live_rows(measure.out, lived, playback)
+    add_live_rows(measure.out, recording, lived, playback)
     return measure.result(_tracked(lived, setup)), lived.drops(recording, playback.jpeg_quality)
 
 
