@@ -158,3 +158,12 @@ def test_a_kept_keyframe_is_small_and_true_to_its_image() -> None:
     assert not inside[-40:].any()
     assert np.abs(kept.colour().astype(int) - colour).mean() < 4
     assert len(kept.packed_depth) + len(kept.packed_colour) < 700_000
+
+
+def test_a_keyframe_without_depth_adds_nothing() -> None:
+    ground_map = GroundMap(CAMERA, GroundMapping(min_keyframes=1))
+    ground_map.add(wall_image(np.nan), SE3.identity())
+    assert len(ground_map.cloud()) == 0
+    ground_map.add(wall_image(2.0), SE3.identity())
+    assert ground_map.keyframes == 2
+    assert len(ground_map.cloud()) > 100
