@@ -124,7 +124,7 @@ class GroundMap:
         self._grid.integrate(blocks, depth, colour, self._intrinsics, T_camera_ground, *reach)
 
     def _extracted(self) -> PointCloud:
-        if self.keyframes == 0:
+        if self._grid.hashmap().size() == 0:
             return PointCloud.empty()
         extracted = self._grid.extract_point_cloud(self._config.min_keyframes - 0.5)
         if extracted.is_empty():
