@@ -6,12 +6,14 @@ import time
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 
+import numpy as np
+
 from airground.core.cloud import Source
 from airground.core.events import Aligned
-from airground.dense.warm_up import warm_up
 from airground.io.recording import Recording
 from airground.link.channel import Receiver
 from airground.tracking import TrackedFrame
+from airground.warm_up import warm_up_mapping
 from evaluation.experiment import peak_memory_mib
 from evaluation.realtime.arrivals import in_order
 from evaluation.realtime.clock import PlaybackClock
@@ -56,7 +58,7 @@ def run_live(
             _start(recording, robot, setup, seed, playback, stack)
             for robot in (Source.GROUND, Source.MAV)
         ]
-        warm_up(setup.config)
+        warm_up_mapping(setup.config, np.random.default_rng(0))
         for robot in robots:
             robot.wait_until_ready()
         lived = Lived(_clock(recording, playback.rate))
