@@ -23,6 +23,7 @@ from evaluation.realtime.drops import nothing_dropped
 from evaluation.realtime.live_run import run_live
 from evaluation.realtime.live_summary import LiveSummary, live_summary
 from evaluation.realtime.lived import Playback
+from evaluation.realtime.radio import RadioLimits
 from evaluation.run import RunResult, run_recording
 from evaluation.setups import Setup
 from sim.truth import Truth
@@ -60,22 +61,39 @@ def test_a_live_run_that_drops_nothing_is_the_run_offline(recording: Recording) 
     live, drops = run_live(recording, truth, SETUP, 0, playback)
     assert drops == nothing_dropped(recording)
     offline = run_recording(recording, truth, SETUP, 0)
-    assert len(live.augmented.cloud_ground) > 100
-    assert live.augmented.cloud_ground.points.tobytes() == (
-        offline.augmented.cloud_ground.points.tobytes()
-    )
-    for robot in ("mav", "ground"):
-        said = [result.tracked[robot].front_end.live_poses() for result in (live, offline)]
-        assert len(said[0]) == 4
-        for (one_ns, one), (two_ns, two) in zip(*said, strict=True):
-            assert one_ns == two_ns
-            assert one.matrix().tobytes() == two.matrix().tobytes()
+    assert_same(live, offline)
     summary = told(live)
     for one in (summary.mav, summary.ground):
         assert (one.survived, one.images, one.dropped, one.posed_ms.n) == (1, 4, 0, 4)
         assert one.mapped_ms.n == 4
         assert one.mbit_s is not None
         assert one.mbit_s > 0
+
+
+def test_a_live_run_that_dropped_much_can_be_had_again(recording: Recording) -> None:
+    """Images come every 33 us, and nobody waits: of each robot's all but the first are late."""
+    truth = Truth.open(recording.path)
+    radio = RadioLimits(loss=1.0)
+    live, drops = run_live(recording, truth, SETUP, 0, Playback(1000.0, 0, radio=radio))
+    summary = told(live)
+    assert summary.ground.dropped == len(drops.dropped.ground) >= 1
+    assert summary.mav.dropped == len(drops.dropped.mav) >= 1
+    assert summary.mav.lost == len(drops.unmapped.mav) == 4 - summary.mav.dropped
+    assert summary.mav.mapped_ms.n == 0
+    assert_same(live, run_recording(recording, truth, SETUP, 0, drops))
+
+
+def assert_same(one: RunResult, two: RunResult) -> None:
+    """To the bit: the map, and every pose when it was first said."""
+    clouds = [result.augmented.cloud_ground for result in (one, two)]
+    assert len(clouds[0]) > 100
+    assert clouds[0].points.tobytes() == clouds[1].points.tobytes()
+    for robot in ("mav", "ground"):
+        said = [result.tracked[robot].front_end.live_poses() for result in (one, two)]
+        assert said[0]
+        for (one_ns, one_pose), (two_ns, two_pose) in zip(*said, strict=True):
+            assert one_ns == two_ns
+            assert one_pose.matrix().tobytes() == two_pose.matrix().tobytes()
 
 
 class Running:
