@@ -68,6 +68,12 @@ class RealtimeWords:
 
         return Playback(self.rate, self.queue, radio=self.radio())
 
+    def variant(self) -> str:
+        """How results name what these words change."""
+        if self.realtime:
+            return self.playback().describe()
+        return "" if self.drops is None else "with frames left out"
+
     def radio(self) -> RadioLimits | None:
         """What lies between the MAV and the ground robot; None for one computer."""
         from evaluation.realtime.radio import RadioLimits

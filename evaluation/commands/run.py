@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -55,7 +55,7 @@ class Run(Verb, AloneWords, RealtimeWords, SetupWords, SeedWord, OutWord):
                 f"{self.recording}: has no {HEADER}; both robots run from a recording that "
                 "simulate has written, one alone from EuRoC or TUM RGB-D with --only"
             )
-        setup, seed = self.setup(), self.checked_seed()
+        setup, seed = replace(self.setup(), variant=self.variant()), self.checked_seed()
         with fresh_folder(self.out) as folder:
             recording = Recording.open(self.recording)
             result, drops = self._result(recording, setup, seed)

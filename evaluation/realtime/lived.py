@@ -32,6 +32,11 @@ class Playback:
     radio: RadioLimits | None = None
     patience_s: float = 2.0
 
+    def describe(self) -> str:
+        """For labels: how this differs from a run that takes its time."""
+        played = "live" if self.rate == 1.0 else f"live, played {self.rate:g} times as fast"
+        return played if self.radio is None else f"{played}, radio: {self.radio.describe()}"
+
     @property
     def jpeg_quality(self) -> int | None:
         """Of the MAV's images as the mapper gets them; None where they are not compressed."""

@@ -51,7 +51,6 @@ class Uplink:
     Attributes:
         shed: Stamps of frames that the mapper had no room for [ns].
         lost: Stamps of frames that the radio lost [ns].
-        sent_bytes: How many bytes were sent, those lost on the way included.
     """
 
     def __init__(self, sender: Sender, radio: Radio | None, jpeg_quality: int | None) -> None:
@@ -60,7 +59,12 @@ class Uplink:
         self._newest_ns = 0
         self.shed: list[int] = []
         self.lost: list[int] = []
-        self.sent_bytes = 0
+        self._bytes = 0
+
+    @property
+    def sent_bytes(self) -> int:
+        """How many bytes were sent, those that vanished on the way included."""
+        return self._bytes if self._radio is None else self._radio.carried_bytes
 
     def offer(self, frame: TrackedFrame) -> None:
         """Send a frame, unless there is no room for it."""
@@ -74,7 +78,7 @@ class Uplink:
         arrives_ns: int | None = frame.stamp_ns
         if self._radio is not None:
             arrives_ns = self._radio.transmit(frame.stamp_ns, size)
-        self.sent_bytes += size
+        self._bytes += size
         if arrives_ns is None:
             self.lost.append(frame.stamp_ns)
             self._hand_over.leave_out(frame)

@@ -43,4 +43,12 @@ def test_losses_are_as_many_as_told_and_the_same_every_time() -> None:
 def test_a_message_that_vanishes_has_used_the_link() -> None:
     radio = Radio(RadioLimits(mbit_s=8.0, loss=1.0), np.random.default_rng(0))
     assert radio.transmit(0, 10_000) is None
+    assert radio.carried_bytes == 10_000
     assert radio._free_ns == 10 * MS
+
+
+def test_what_is_given_up_has_used_nothing() -> None:
+    radio = Radio(RadioLimits(mbit_s=8.0), np.random.default_rng(0))
+    assert radio.transmit(0, 600_000) == 600 * MS
+    assert radio.transmit(MS, 600_000) is None
+    assert radio.carried_bytes == 600_000
