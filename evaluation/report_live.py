@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from evaluation.realtime.live_summary import (
     DEADLINE_MS,
     Latency,
@@ -24,33 +26,25 @@ def live_rows(summary: LiveSummary) -> tuple[tuple[str, str, str], ...]:
     """What is measured, of the MAV, of the ground robot; the mapper's once for both."""
     mav, ground = summary.mav, summary.ground
 
-    def both(title: str, mav_cell: str, ground_cell: str) -> tuple[str, str, str]:
-        return title, mav_cell, ground_cell
+    def each(title: str, cell: Callable[[LiveRobot], str]) -> tuple[str, str, str]:
+        return title, cell(mav), cell(ground)
 
     rows = [
-        both("images dropped", *(f"{one.dropped} of {one.images}" for one in (mav, ground))),
-        both("frames not mapped", _unmapped(mav), _unmapped(ground)),
-        both("pose after its image", _latency(mav.posed_ms), _latency(ground.posed_ms)),
-        both(
-            f"poses later than {DEADLINE_MS:.0f} ms",
-            str(mav.deadlines_missed),
-            str(ground.deadlines_missed),
-        ),
-        both("mapped after its image", _latency(mav.mapped_ms), _latency(ground.mapped_ms)),
+        each("images dropped", lambda robot: f"{robot.dropped} of {robot.images}"),
+        each("frames not mapped", _unmapped),
+        each("pose after its image", lambda robot: _latency(robot.posed_ms)),
+        each(f"poses later than {DEADLINE_MS:.0f} ms", lambda robot: str(robot.deadlines_missed)),
+        each("mapped after its image", lambda robot: _latency(robot.mapped_ms)),
         ("surface located after its last image", _latency(summary.aligned_ms), ""),
-        both("most images waiting", str(mav.longest_queue), str(ground.longest_queue)),
-        both("most frames before the mapper", *(str(o.most_under_way) for o in (mav, ground))),
-        both("sent to the mapper", *(_text(one.mbit_s, "{:.2f} Mbit/s") for one in (mav, ground))),
-        both(
-            "processor, of one core",
-            *(_percent(one.processor_share) for one in (mav, ground)),
-        ),
+        each("most images waiting", lambda robot: str(robot.longest_queue)),
+        each("most frames before the mapper", lambda robot: str(robot.most_under_way)),
+        each("sent to the mapper", lambda robot: _text(robot.mbit_s, "{:.2f} Mbit/s")),
+        each("processor, of one core", lambda robot: _percent(robot.processor_share)),
         ("processor, mapper", "", _percent(summary.mapper_processor_share)),
         ("peak memory, all processes", "", _text(summary.peak_memory_mib, "{:.0f} MiB")),
     ]
-    if mav.survived < summary.runs or ground.survived < summary.runs:
-        cells = (f"{one.survived} of {summary.runs}" for one in (mav, ground))
-        rows.insert(0, both("survived", *cells))
+    if min(mav.survived, ground.survived) < summary.runs:
+        rows.insert(0, each("survived", lambda robot: f"{robot.survived} of {summary.runs}"))
     return tuple(rows)
 
 
