@@ -58,11 +58,6 @@ def test_a_ground_frame_survives_with_its_correction() -> None:
     assert received.trajectory.rotations.tobytes() == path(5).rotations.tobytes()
 
 
-def test_received_arrays_lie_in_memory_as_numpy_lays_them() -> None:
-    poses = [unpack(pack(mav_frame(stamp))).pose.T_map_camera for stamp in range(20)]
-    assert all(pose is not None and pose.rotation.ctypes.data % 16 == 0 for pose in poses)
-
-
 def test_a_lost_frame_has_no_pose() -> None:
     image = mav_frame(7).image
     frame = TrackedFrame(image, TrackedPose(7, Tracking.LOST, None))
