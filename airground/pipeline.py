@@ -1,7 +1,8 @@
 """The localization and mapping pipeline, as in the paper's Figure 4.
 
-Sensor messages in, events out. Each robot maps on its own; whenever the MAV has a new
-surface it is located in the ground robot's map, refined, and added to it.
+Tracked frames in, events out. Each robot maps on its own; whenever the MAV has a new
+surface it is located in the ground robot's map, refined, and added to it. Tracking
+(`tracking.py`) hears nothing of all this.
 """
 
 from __future__ import annotations
@@ -26,97 +27,68 @@ from airground.core.events import (
     SurfaceCast,
     TrackingLost,
 )
-from airground.core.messages import (
-    GroundImage,
-    ImuSamples,
-    MagneticSamples,
-    MavImage,
-    RobotCalibration,
-    Stamped,
-)
+from airground.core.messages import GroundImage, MavImage, RobotCalibration
 from airground.core.se3 import SE3
 from airground.core.surface import AerialSurface
+from airground.core.trajectory import Trajectory
 from airground.dense.reconstruction import DenseReconstruction
-from airground.dense.warm_up import warm_up_dense
 from airground.ground_map import GroundMap
-from airground.localization.heading import HeadingEstimator
 from airground.localization.particle_filter import MonteCarloLocalizer
-from airground.localization.warm_up import warm_up_localization
 from airground.refinement import refine
-from airground.refinement.warm_up import warm_up_refinement
-from airground.slam.front_end import FrontEnd, TrackedPose, Tracking
-from airground.slam.warm_up import warm_up_slam
-
-
-@dataclass(frozen=True)
-class FrontEnds:
-    """Who says where the cameras are (Sec. IV)."""
-
-    mav: FrontEnd[MavImage]
-    ground: FrontEnd[GroundImage]
+from airground.slam.front_end import TrackedPose, Tracking
+from airground.tracking import TrackedFrame
 
 
 class Mapping:
-    """The upper half of Figure 4: what each robot knows without the other.
+    """The middle of Figure 4: what both robots' maps hold, made from tracked frames.
 
     Args:
         config: The pipeline's parameters.
         mav, ground: What is known about the robots' sensors.
-        front_ends: Who says where the cameras are.
     """
 
-    def __init__(
-        self, config: Config, mav: RobotCalibration, ground: RobotCalibration, front_ends: FrontEnds
-    ) -> None:
-        self._calibration = {Source.MAV: mav, Source.GROUND: ground}
-        self._front_ends = front_ends
+    def __init__(self, config: Config, mav: RobotCalibration, ground: RobotCalibration) -> None:
         self._dense = DenseReconstruction(mav.camera, config)
-        self._magnetic: dict[Source, list[MagneticSamples]] = {Source.MAV: [], Source.GROUND: []}
-        self._north = {Source.MAV: HeadingEstimator(), Source.GROUND: HeadingEstimator()}
+        self._north: dict[Source, float | None] = {Source.MAV: None, Source.GROUND: None}
+        self._correction: Trajectory | None = None
         self.ground_map = GroundMap(ground.camera, config.ground_mapping)
-        self._ground_poses_corrected = False
         self.mav_pose: TrackedPose | None = None
         self.ground_pose: TrackedPose | None = None
 
-    def add(self, stamped: Stamped) -> Iterator[Event]:
-        """Take in one message of one robot."""
-        match stamped.message:
+    def take(self, frame: TrackedFrame) -> Iterator[Event]:
+        """Take in one frame; those of both robots come in order of time."""
+        self._north[frame.robot] = frame.north_rad
+        match frame.image:
             case MavImage() as image:
-                yield from self._add_mav_image(image)
+                yield from self._take_mav_image(image, frame.pose)
             case GroundImage() as image:
-                yield from self._add_ground_image(image)
-            case ImuSamples() as samples:
-                front_ends = self._front_ends
-                front_end = front_ends.mav if stamped.robot == Source.MAV else front_ends.ground
-                front_end.add_imu(samples)
-            case MagneticSamples() as samples:
-                self._magnetic[stamped.robot].append(samples)
+                self.correct_ground(frame.trajectory)
+                yield from self._take_ground_image(image, frame.pose)
+
+    def correct_ground(self, trajectory: Trajectory | None) -> None:
+        """The ground robot now believes in these poses of its images; None changes nothing."""
+        if trajectory is not None:
+            self._correction = trajectory
 
     def flush(self) -> Iterator[Event]:
         """Finish what is under construction at the end of a recording."""
         yield from self._dense.flush()
-        self._front_ends.mav.finish()
-        self._front_ends.ground.finish()
-        self._ground_poses_corrected = True
 
     def ground_cloud(self) -> PointCloud:
-        """The ground robot's map in the frame `ground`, at the poses that are believed now."""
-        if self._ground_poses_corrected:
-            trajectory = self._front_ends.ground.trajectory()
-            if trajectory is not None:
-                self.ground_map.follow(trajectory)
-            self._ground_poses_corrected = False
+        """The ground robot's map in the frame `ground`, at the poses of its last correction."""
+        if self._correction is not None:
+            self.ground_map.follow(self._correction)
+            self._correction = None
         return self.ground_map.cloud()
 
     def relative_heading(self) -> float | None:
         """Turn of the frame `mav` in `ground` by the magnetometers [rad], None before both know."""
-        mav, ground = (self._north[robot].heading() for robot in (Source.MAV, Source.GROUND))
+        mav, ground = self._north[Source.MAV], self._north[Source.GROUND]
         if mav is None or ground is None:
             return None
         return float(np.angle(np.exp(1j * (ground - mav))))
 
-    def _add_mav_image(self, image: MavImage) -> Iterator[Event]:
-        pose = self._front_ends.mav.track(image)
+    def _take_mav_image(self, image: MavImage, pose: TrackedPose) -> Iterator[Event]:
         self.mav_pose = pose
         if pose.T_map_camera is None:
             yield _no_pose(pose, Source.MAV)
@@ -124,30 +96,19 @@ class Mapping:
         yield MavTracked(image.stamp_ns, pose.T_map_camera, pose.covariance, _scale_sigma(pose))
         if pose.corrected:
             yield PosesCorrected(image.stamp_ns, Source.MAV)
-        self._take_bearing(Source.MAV, pose.T_map_camera)
         yield from self._dense.add(image.stamp_ns, image.image, pose.T_map_camera, pose.depth_range)
 
-    def _add_ground_image(self, image: GroundImage) -> Iterator[Event]:
-        pose = self._front_ends.ground.track(image)
+    def _take_ground_image(self, image: GroundImage, pose: TrackedPose) -> Iterator[Event]:
         self.ground_pose = pose
         if pose.T_map_camera is None:
             yield _no_pose(pose, Source.GROUND)
             return
         yield GroundTracked(image.stamp_ns, pose.T_map_camera, pose.covariance, _scale_sigma(pose))
         if pose.corrected:
-            self._ground_poses_corrected = True
             yield PosesCorrected(image.stamp_ns, Source.GROUND)
-        self._take_bearing(Source.GROUND, pose.T_map_camera)
         if self.ground_map.wants(pose.T_map_camera):
             self.ground_map.add(image, pose.T_map_camera)
             yield GroundMapExtended(image.stamp_ns, self.ground_map.keyframes)
-
-    def _take_bearing(self, robot: Source, T_map_camera: SE3) -> None:
-        """Turn the magnetic field measured since the last image into the robot's map."""
-        R_camera_imu = self._calibration[robot].T_imu_camera.rotation.T
-        for samples in self._magnetic[robot]:
-            self._north[robot].add(samples.field, T_map_camera.rotation @ R_camera_imu)
-        self._magnetic[robot].clear()
 
 
 def _no_pose(pose: TrackedPose, robot: Source) -> Event:
@@ -199,12 +160,11 @@ def sight(surface: AerialSurface, mapping: Mapping) -> Sighting | None:
 
 
 class Pipeline:
-    """Figure 4: map with both robots, locate the one in the other's map, refine, augment.
+    """Figure 4 above tracking: map, locate one robot in the other's map, refine, augment.
 
     Args:
         config: The pipeline's parameters.
         mav, ground: What is known about the robots' sensors.
-        front_ends: Who says where the cameras are.
         rng: The one source of randomness.
         T_ground_mav_prior: Where given, refinement starts from it and the global search is
             skipped (Sec. III).
@@ -215,21 +175,20 @@ class Pipeline:
         config: Config,
         mav: RobotCalibration,
         ground: RobotCalibration,
-        front_ends: FrontEnds,
         rng: np.random.Generator,
         T_ground_mav_prior: SE3 | None = None,
     ) -> None:
         self._config = config
-        self.mapping = Mapping(config, mav, ground, front_ends)
+        self.mapping = Mapping(config, mav, ground)
         self._localizer = MonteCarloLocalizer(config, rng)
         self._augmentation = Augmentation(config.ground_mapping.voxel_m)
         self._T_ground_mav = T_ground_mav_prior
         self._has_prior = T_ground_mav_prior is not None
 
-    def run(self, messages: Iterable[Stamped]) -> Iterator[Event]:
-        """Process messages in time order; yields every stage's event as it finishes."""
-        for message in messages:
-            for event in self.mapping.add(message):
+    def run(self, frames: Iterable[TrackedFrame]) -> Iterator[Event]:
+        """Process frames in time order; yields every stage's event as it finishes."""
+        for frame in frames:
+            for event in self.mapping.take(frame):
                 yield from self._react(event)
         for event in self.mapping.flush():
             yield from self._react(event)
@@ -291,16 +250,3 @@ def moved(cloud: PointCloud, T_a_b: SE3) -> PointCloud:
     if cloud.normals is not None:
         normals = (cloud.normals @ T_a_b.rotation.T).astype(np.float32)
     return PointCloud((T_a_b @ cloud.points).astype(np.float32), cloud.colours, normals)
-
-
-def warm_up(config: Config, rng: np.random.Generator) -> None:
-    """Compile what all stages need, so that no frame has to wait for it.
-
-    Args:
-        config: What will run.
-        rng: Draws what it is tried on.
-    """
-    warm_up_slam(rng)
-    warm_up_dense(config)
-    warm_up_localization(config, rng)
-    warm_up_refinement(config)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from airground.core.cloud import Source
 from airground.core.messages import GroundImage, MavImage
 from airground.io.recording import Recording
-from airground.pipeline import FrontEnds
 from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
+from airground.tracking import FrontEnds
 from evaluation.oracle import oracle_front_ends
 from evaluation.setups import Setup
 from evaluation.tracking_quality import Tracked
@@ -33,6 +35,10 @@ class WatchedFrontEnds:
     def front_ends(self) -> FrontEnds:
         """As the pipeline takes them."""
         return FrontEnds(self.mav, self.ground)
+
+    def of(self, robot: Source) -> WatchedFrontEnd[Any]:
+        """One of them."""
+        return self.mav if robot == Source.MAV else self.ground
 
     def tracked(self) -> dict[str, Tracked]:
         """What they said, by robot; to be asked at the end."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,7 +17,9 @@ from airground.core.events import (
 )
 from airground.core.surface import DepthMap
 from airground.io.recording import Recording
-from airground.pipeline import Mapping, Sighting, sight, warm_up
+from airground.pipeline import Mapping, Sighting, sight
+from airground.tracking import TrackedFrame, Trackers
+from airground.warm_up import warm_up
 from evaluation.front_ends import front_ends_for
 from evaluation.setups import Setup
 from evaluation.timing import STAGE_OF, timed
@@ -48,14 +50,15 @@ def map_recording(recording: Recording, truth: Truth, setup: Setup, seed: int) -
     """Run the upper half of Figure 4 over a whole recording."""
     rng = np.random.default_rng([seed, 0])
     watched = front_ends_for(setup, recording, truth, rng)
-    mapping = Mapping(setup.config, recording.mav, recording.ground, watched.front_ends())
+    trackers = Trackers(recording.mav, recording.ground, watched.front_ends())
+    mapping = Mapping(setup.config, recording.mav, recording.ground)
     maps = Maps()
     made: dict[int, DepthMap] = {}
     fused: list[DepthMap] = []
     # Compiling is no part of what is timed.
     warm_up(setup.config, np.random.default_rng(0))
     started = time.perf_counter()
-    for event, duration_ms in timed(_events(recording, mapping)):
+    for event, duration_ms in timed(_events(trackers.frames(recording.messages()), mapping)):
         if type(event) in STAGE_OF:
             maps.durations_ms[STAGE_OF[type(event)]].append(duration_ms)
         match event:
@@ -69,12 +72,13 @@ def map_recording(recording: Recording, truth: Truth, setup: Setup, seed: int) -
                     maps.sightings.append(sighting)
                     maps.depth_maps.append(fused)
                 fused = []
+    trackers.finish()
     maps.processing_s = time.perf_counter() - started
     maps.tracked = watched.tracked()
     return maps
 
 
-def _events(recording: Recording, mapping: Mapping) -> Iterator[Event]:
-    for message in recording.messages():
-        yield from mapping.add(message)
+def _events(frames: Iterable[TrackedFrame], mapping: Mapping) -> Iterator[Event]:
+    for frame in frames:
+        yield from mapping.take(frame)
     yield from mapping.flush()

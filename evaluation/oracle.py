@@ -18,8 +18,8 @@ from airground.core.messages import GroundImage, ImuSamples, MavImage
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.io.recording import Recording
-from airground.pipeline import FrontEnds
 from airground.slam.front_end import TrackedPose, Tracking
+from airground.tracking import FrontEnds
 from sim.truth import Truth
 
 MAV_WANDER_S = 4.0

@@ -17,6 +17,7 @@ from evaluation.headline import headlines
 from evaluation.report_budget import budget_table
 from evaluation.report_failures import control_table, failure_table
 from evaluation.report_figures import report_figures
+from evaluation.report_live import live_table
 from evaluation.report_tables import comparison_table, scene_table, timing_table
 from evaluation.report_trajectories import trajectory_table
 from evaluation.results import Condition, ResultTable, shared_parts
@@ -79,6 +80,7 @@ def write_report(
         trajectories=trajectory_table(table, shown),
         budget=budget_table(measured),
         timing=timing_table(measured),
+        live=live_table(measured),
         by_scene=scene_table(primary),
         controls=control_table(table, shown),
         failures=failure_table(measured),

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from evaluation import published
+from evaluation.realtime.live_summary import STAGE, live_summary
 from evaluation.results import Condition, ResultTable, short_labels
 from evaluation.statistics import Rate, quantile, quantiles, rate_within, wilson
 from evaluation.summary import real_time_factor, within_5cm_2deg
@@ -207,6 +208,16 @@ def _wrongly_claimed(table: ResultTable) -> str:
     return rate(made) if made.total else MISSING
 
 
+def _live_rate(table: ResultTable) -> str:
+    live = live_summary(table)
+    return MISSING if live is None or live.mav.mbit_s is None else f"{live.mav.mbit_s:.2f} Mbit/s"
+
+
+def _live_delay(table: ResultTable) -> str:
+    delays = table.values(STAGE, "aligned_ms")
+    return f"{quantile(delays, 0.5):.0f} ms" if len(delays) else MISSING
+
+
 _COMPARED_ROWS: tuple[tuple[str, str, Callable[[ResultTable], str]], ...] = (
     ("sequences", "41", lambda t: _count(len(t.sequences("error_m")))),
     ("within 0.5 m at iteration 1", "65 %", lambda t: rate(success_at(t, 1, 0.5))),
@@ -232,5 +243,7 @@ _COMPARED_ROWS: tuple[tuple[str, str, Callable[[ResultTable], str]], ...] = (
     ),
     ("fused surface, median error", MISSING, _surface),
     ("fused surface, pixels with depth", MISSING, _median_of("surface", "completeness", _percent)),
+    ("live: sent by the MAV", MISSING, _live_rate),
+    ("live: surface located after its last image, median", MISSING, _live_delay),
     ("recorded over processing seconds", "real time\nwith a GPU", _real_time),
 )

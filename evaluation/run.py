@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,11 +19,15 @@ from airground.core.events import (
 )
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
+from airground.io.ply import write_ply
 from airground.io.recording import Recording
 from airground.io.tum import write_tum
-from airground.pipeline import Pipeline, Sighting, sight, warm_up
+from airground.pipeline import Pipeline, Sighting, sight
+from airground.tracking import TrackedFrame, Trackers
+from airground.warm_up import warm_up
 from evaluation.experiment import peak_memory_mib
 from evaluation.front_ends import front_ends_for
+from evaluation.realtime.drops import DropList, nothing_dropped
 from evaluation.relation import pose_error
 from evaluation.results import ResultTable
 from evaluation.row_writer import RowWriter
@@ -49,39 +54,48 @@ class RunResult:
     T_ground_mav: SE3 | None
 
 
-def run_recording(recording: Recording, truth: Truth, setup: Setup, seed: int) -> RunResult:
+def run_recording(
+    recording: Recording, truth: Truth, setup: Setup, seed: int, drops: DropList | None = None
+) -> RunResult:
     """Run the pipeline of Figure 4 from the first message to the last.
 
     The whole run counts as one sequence, with as many iterations as there were aerial maps,
     and every refinement as one trial.
+
+    Args:
+        recording: What both robots sensed.
+        truth: Measures the result, and makes the poses of oracles.
+        setup: How the pipeline is set.
+        seed: Of all that is random.
+        drops: Which frames to do without, as a live run did.
     """
-    pose_rng, pipeline_rng = np.random.default_rng(seed).spawn(2)
-    watched = front_ends_for(setup, recording, truth, pose_rng)
-    pipeline = Pipeline(
-        setup.config, recording.mav, recording.ground, watched.front_ends(), pipeline_rng
-    )
-    condition = setup.condition(recording.sensors)
-    out = RowWriter(recording.scene, recording.seed, recording.flight, condition)
-    measure = _Measure(out, pipeline, truth)
+    drops = drops or nothing_dropped(recording)
+    watched = front_ends_for(setup, recording, truth, front_end_rng(seed))
+    trackers = Trackers(recording.mav, recording.ground, watched.front_ends())
+    measure = Measure(recording, truth, setup, seed)
     # Compiling is no part of what is timed.
     warm_up(setup.config, np.random.default_rng(0))
     started = time.perf_counter()
-    for event, duration_ms in timed(pipeline.run(recording.messages())):
-        measure.take(event, duration_ms)
+    messages = recording.messages(drops.dropped.by_robot())
+    measure.run(drops.received(trackers.frames(messages)))
+    measure.pipeline.mapping.correct_ground(trackers.finish())
+    out = measure.out
     out.add("run", "recorded_s", recording.duration_s, "s")
     out.add("run", "processing_s", time.perf_counter() - started, "s")
     out.add("run", "peak_memory_mib", peak_memory_mib(), "MiB")
-    if measure.iterations == 0:
-        out.add_no_belief("no aerial map came while both robots knew where they were", 0, 1)
-    tracked = watched.tracked()
-    add_tracking(out, tracked["mav"], truth.T_world_mav_camera)
-    add_tracking(out, tracked["ground"], truth.T_world_ground_camera)
-    return RunResult(
-        ResultTable.from_rows(out.rows),
-        tracked,
-        pipeline.augmented_map(),
-        measure.T_ground_mav,
-    )
+    return measure.result(watched.tracked())
+
+
+def front_end_rng(seed: int) -> np.random.Generator:
+    """Draws what the front ends need; the pipeline has a generator of its own."""
+    return np.random.default_rng(seed).spawn(2)[0]
+
+
+def write_run(folder: Path, recording: Recording, result: RunResult) -> None:
+    """Write `augmented_map.ply` and the robots' trajectories."""
+    augmented = result.augmented
+    write_ply(folder / "augmented_map.ply", augmented.cloud_ground, augmented.sources)
+    write_trajectories(folder, recording, result.tracked)
 
 
 def write_trajectories(folder: Path, recording: Recording, tracked: dict[str, Tracked]) -> None:
@@ -102,34 +116,69 @@ def write_trajectories(folder: Path, recording: Recording, tracked: dict[str, Tr
                 write_tum(folder / f"{name}.tum", path)
 
 
-class _Measure:
-    """Turns events into rows."""
+class Measure:
+    """Runs the pipeline and turns its events into rows.
 
-    def __init__(self, out: RowWriter, pipeline: Pipeline, truth: Truth) -> None:
-        self.iterations = 0
-        self.T_ground_mav: SE3 | None = None
-        self._trials = 0
-        self._out, self._pipeline, self._truth = out, pipeline, truth
+    Args:
+        recording: What both robots sensed.
+        truth: What is true.
+        setup: How the pipeline is set.
+        seed: Of all that is random.
+
+    Attributes:
+        pipeline: All stages above tracking.
+        out: What was measured.
+    """
+
+    def __init__(self, recording: Recording, truth: Truth, setup: Setup, seed: int) -> None:
+        self.pipeline = Pipeline(
+            setup.config,
+            recording.mav,
+            recording.ground,
+            np.random.default_rng(seed).spawn(2)[1],
+        )
+        condition = setup.condition(recording.sensors)
+        self.out = RowWriter(recording.scene, recording.seed, recording.flight, condition)
+        self._truth = truth
+        self._iterations = self._trials = 0
+        self._T_ground_mav: SE3 | None = None
         self._belief: Belief | None = None
         self._sighting: Sighting | None = None
 
+    def run(self, frames: Iterable[TrackedFrame]) -> None:
+        """Take in all frames, in order of time."""
+        for event, duration_ms in timed(self.pipeline.run(frames)):
+            self.take(event, duration_ms)
+
+    def result(self, tracked: dict[str, Tracked]) -> RunResult:
+        """What the run leaves, once the front ends have finished."""
+        if self._iterations == 0:
+            self.out.add_no_belief(
+                "no aerial map came while both robots knew where they were", 0, 1
+            )
+        add_tracking(self.out, tracked["mav"], self._truth.T_world_mav_camera)
+        add_tracking(self.out, tracked["ground"], self._truth.T_world_ground_camera)
+        table = ResultTable.from_rows(self.out.rows)
+        return RunResult(table, tracked, self.pipeline.augmented_map(), self._T_ground_mav)
+
     def take(self, event: Event, duration_ms: float) -> None:
+        """Measure what one event tells."""
         match event:
             case SurfaceCast():
-                self._sighting = sight(event.surface, self._pipeline.mapping)
+                self._sighting = sight(event.surface, self.pipeline.mapping)
             case BeliefUpdated():
                 self._take_belief(event.belief)
             case Aligned():
                 self._take_alignment(event, duration_ms)
         if type(event) in STAGE_OF and not isinstance(event, Aligned):
-            self._out.add("timing", STAGE_OF[type(event)], duration_ms, "ms")
+            self.out.add("timing", STAGE_OF[type(event)], duration_ms, "ms")
 
     def _take_belief(self, belief: Belief) -> None:
         self._belief = belief
-        self.iterations += 1
+        self._iterations += 1
         assert self._sighting is not None
         error = pose_error(belief.T_ground_mav, self._sighting, self._truth)
-        self._out.add_belief(belief, error, 0, self.iterations)
+        self.out.add_belief(belief, error, 0, self._iterations)
 
     def _take_alignment(self, event: Aligned, duration_ms: float) -> None:
         alignment = event.alignment
@@ -137,7 +186,7 @@ class _Measure:
         assert self._belief is not None
         start = {"before": self._belief.T_ground_mav, "after": alignment.T_ground_mav}
         errors = {when: pose_error(T, self._sighting, self._truth) for when, T in start.items()}
-        self._out.add_alignment(alignment, errors, duration_ms, self._trials)
+        self.out.add_alignment(alignment, errors, duration_ms, self._trials)
         self._trials += 1
         if alignment.accepted:
-            self.T_ground_mav = alignment.T_ground_mav
+            self._T_ground_mav = alignment.T_ground_mav

@@ -5,6 +5,8 @@ from __future__ import annotations
 from rich.console import Console
 from rich.table import Table
 
+from evaluation.realtime.live_summary import LiveSummary
+from evaluation.report_live import live_rows
 from evaluation.summary import Summary
 
 
@@ -22,7 +24,19 @@ def print_summary(summary: Summary, console: Console | None = None) -> None:
     shown.add_column("paper", justify="right")
     for row in _rows(summary):
         shown.add_row(*row)
-    (console or Console()).print(shown)
+    console = console or Console()
+    console.print(shown)
+    if summary.realtime is not None:
+        console.print(_live(summary.realtime))
+
+
+def _live(summary: LiveSummary) -> Table:
+    shown = Table(title="live", caption="latencies: median, 95 %, worst", title_justify="left")
+    for header in ("", "MAV", "ground robot"):
+        shown.add_column(header, justify="right" if header else "left")
+    for row in live_rows(summary):
+        shown.add_row(*row)
+    return shown
 
 
 def _rows(summary: Summary) -> list[tuple[str, str, str]]:

@@ -2,7 +2,7 @@
 
 One summary speaks of one condition. A quantile that failures reach (they count as
 infinite) is null, and so is whatever was not measured; keys are always there. With an
-oracle's poses no SLAM ran, so that all of `slam` is null.
+oracle's poses no SLAM ran, so that all of `slam` is null; without --realtime `realtime` is.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from airground.errors import InputError
 from evaluation.published import TABLE_I
+from evaluation.realtime.live_summary import LiveSummary, live_summary
 from evaluation.results import Condition, ResultTable
 from evaluation.run_info import RunInfo
 from evaluation.statistics import quantile, quantiles, rate_within, wilson, with_failures
@@ -159,6 +160,7 @@ class Summary(_Part):
     refinement: Refinement
     timing_ms: TimingTable
     real_time_factor: Number
+    realtime: LiveSummary | None = None
 
     def write(self, path: Path) -> None:
         text = json.dumps(self.model_dump(by_alias=True), indent=2, allow_nan=False)
@@ -205,6 +207,7 @@ def build_summary(table: ResultTable, condition: Condition, run: RunInfo) -> Sum
         refinement=_refinement(measured),
         timing_ms=_timing(measured),
         real_time_factor=real_time_factor(measured),
+        realtime=live_summary(measured),
     )
 
 

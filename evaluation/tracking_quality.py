@@ -14,7 +14,7 @@ from airground.slam.front_end import Tracking
 from evaluation.consistency import consistency
 from evaluation.row_writer import RowWriter
 from evaluation.trajectory_error import aligned_errors, trajectory_error
-from evaluation.watched_front_end import WatchedFrontEnd
+from evaluation.watched_front_end import FrontEndLog
 
 STAGE = "trajectory"
 ERROR_STAGE = "trajectory_error"
@@ -35,7 +35,7 @@ class Tracked:
     """
 
     robot: str
-    front_end: WatchedFrontEnd
+    front_end: FrontEndLog
     final: Trajectory | None
     slam: bool
 
@@ -69,7 +69,7 @@ def add_tracking(out: RowWriter, tracked: Tracked, true_pose: Callable[[int], SE
 
 
 def _over_time(
-    front_end: WatchedFrontEnd, poses: list[tuple[int, SE3]], true_pose: Callable[[int], SE3]
+    front_end: FrontEndLog, poses: list[tuple[int, SE3]], true_pose: Callable[[int], SE3]
 ) -> Iterator[tuple[float, float]]:
     """Seconds since the first image and the error then, NaN where there was no pose."""
     stamps = np.array([stamp for stamp, _ in poses], np.int64)
@@ -88,7 +88,7 @@ def _spaced(stamps_ns: NDArray[np.int64]) -> list[int]:
     return stamps_ns[first].tolist()
 
 
-def _add_gaps(out: RowWriter, robot: str, front_end: WatchedFrontEnd) -> None:
+def _add_gaps(out: RowWriter, robot: str, front_end: FrontEndLog) -> None:
     """How long it took to begin, and how much was tracked from then on."""
     since = front_end.since_tracking()
     if not since:
@@ -102,7 +102,7 @@ def _add_gaps(out: RowWriter, robot: str, front_end: WatchedFrontEnd) -> None:
 
 
 def _add_consistency(
-    out: RowWriter, robot: str, front_end: WatchedFrontEnd, true_pose: Callable[[int], SE3]
+    out: RowWriter, robot: str, front_end: FrontEndLog, true_pose: Callable[[int], SE3]
 ) -> None:
     """Only what the front end reports; an oracle claims nothing."""
     parts = zip(("position", "pose"), consistency(front_end.answers, true_pose), strict=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 from airground.core.messages import GroundImage, ImuSamples, MavImage
@@ -13,21 +14,40 @@ from airground.slam.front_end import FrontEnd, TrackedPose, Tracking
 Image = TypeVar("Image", MavImage, GroundImage)
 
 
-class WatchedFrontEnd(Generic[Image]):
-    """Passes everything on, and keeps the answers and their times.
+@dataclass
+class FrontEndLog:
+    """What a front end said.
 
     Attributes:
         answers: One an image, in order of time.
         durations_ms: Of each image with the inertial samples before it, mapping included,
             decoding not.
+    """
+
+    answers: list[TrackedPose] = field(default_factory=list)
+    durations_ms: list[float] = field(default_factory=list)
+
+    def live_poses(self) -> list[tuple[int, SE3]]:
+        """Stamp and pose of each tracked image, as they were said at its time."""
+        return [(a.stamp_ns, a.T_map_camera) for a in self.answers if a.T_map_camera is not None]
+
+    def since_tracking(self) -> list[TrackedPose]:
+        """The answers from the first tracked image on; none where there is no such image."""
+        for first, answer in enumerate(self.answers):
+            if answer.tracking is Tracking.TRACKED:
+                return self.answers[first:]
+        return []
+
+
+class WatchedFrontEnd(FrontEndLog, Generic[Image]):
+    """Passes everything on, and keeps the answers and their times.
 
     Args:
         inner: Who really tracks.
     """
 
     def __init__(self, inner: FrontEnd[Image]) -> None:
-        self.answers: list[TrackedPose] = []
-        self.durations_ms: list[float] = []
+        super().__init__()
         self._inner: FrontEnd[Image] = inner
         self._imu_s = 0.0
 
@@ -54,13 +74,6 @@ class WatchedFrontEnd(Generic[Image]):
         """The poses that it believes in now."""
         return self._inner.trajectory()
 
-    def live_poses(self) -> list[tuple[int, SE3]]:
-        """Stamp and pose of each tracked image, as they were said at its time."""
-        return [(a.stamp_ns, a.T_map_camera) for a in self.answers if a.T_map_camera is not None]
-
-    def since_tracking(self) -> list[TrackedPose]:
-        """The answers from the first tracked image on; none where there is no such image."""
-        for first, answer in enumerate(self.answers):
-            if answer.tracking is Tracking.TRACKED:
-                return self.answers[first:]
-        return []
+    def log(self) -> FrontEndLog:
+        """What it said, without itself."""
+        return FrontEndLog(self.answers, self.durations_ms)

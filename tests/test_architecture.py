@@ -14,10 +14,12 @@ import pytest
 ROOT = Path(__file__).parent.parent
 ROOMS = ("airground", "sim", "evaluation")
 STAGES = ("slam", "dense", "localization", "refinement", "augmentation", "ground_map")
-"""Modules and packages of `airground` that only `pipeline.py` may bring together."""
+"""Modules and packages of `airground` that only those below may bring together."""
 SHARED = ("core", "config", "errors")
 """What a stage may import from `airground`."""
-MEETING_PLACE = "airground/pipeline.py"
+MEETING_PLACES = ("pipeline", "tracking", "link", "warm_up")
+"""Figure 4 above tracking; tracking, which knows nothing of what is above; what lies between;
+and what compiles all stages above tracking."""
 RECORDING_WRITERS = ("airground/io/layout.py", "airground/io/recording_writer.py")
 """Know the name of the truth's folder, since `sim` writes recordings through them."""
 PEERS = ("evaluation/bench/peers.py",)
@@ -33,6 +35,7 @@ DISTRIBUTION_OF = {
     "small_gicp": "small-gicp",
     "tomli_w": "tomli-w",
     "yaml": "pyyaml",
+    "zmq": "pyzmq",
 }
 """Imports whose package is called otherwise."""
 
@@ -112,10 +115,17 @@ def test_core_imports_nothing_else_of_ours() -> None:
 
 def test_every_part_of_airground_has_a_known_place() -> None:
     """A new stage must be named above, or the rules would pass it by."""
-    known = {*STAGES, *SHARED, "io", "pipeline", "__init__"}
+    known = {*STAGES, *SHARED, *MEETING_PLACES, "io", "__init__"}
     parts = {Path(file).parts[1].removesuffix(".py") for file in sources("airground")}
     assert parts - known == set()
-    assert (ROOT / MEETING_PLACE).exists()
+    assert parts.issuperset(MEETING_PLACES)
+
+
+def test_tracking_knows_nothing_of_mapping() -> None:
+    """So that a tracker can live on another computer than the mapper, and never waits for it."""
+    mapping = ("pipeline", "dense", "ground_map", "refinement", "augmentation")
+    forbidden = [f"airground.{name}" for name in mapping]
+    assert importing(["airground/tracking.py", *sources("airground/link")], *forbidden) == []
 
 
 def strings(file: str) -> Iterator[tuple[int, str]]:

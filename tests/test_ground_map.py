@@ -80,7 +80,7 @@ def test_same_frames_same_bytes() -> None:
 def test_keyframes_follow_motion() -> None:
     ground_map = GroundMap(CAMERA, GroundMapping(keyframe_distance_m=0.1, keyframe_angle_deg=5))
     assert ground_map.wants(SE3.identity())
-    ground_map.add(wall_image(2.0), SE3.identity())
+    ground_map.add(wall_image(2.007), SE3.identity())
     assert not ground_map.wants(SE3.from_heading(np.deg2rad(4.9), [0.09, 0, 0]))
     assert ground_map.wants(SE3.from_heading(0.0, [0.11, 0, 0]))
     assert ground_map.wants(SE3.from_heading(np.deg2rad(5.1)))
@@ -158,3 +158,12 @@ def test_a_kept_keyframe_is_small_and_true_to_its_image() -> None:
     assert not inside[-40:].any()
     assert np.abs(kept.colour().astype(int) - colour).mean() < 4
     assert len(kept.packed_depth) + len(kept.packed_colour) < 700_000
+
+
+def test_a_keyframe_without_depth_adds_nothing() -> None:
+    ground_map = GroundMap(CAMERA, GroundMapping(min_keyframes=1))
+    ground_map.add(wall_image(np.nan), SE3.identity())
+    assert len(ground_map.cloud()) == 0
+    ground_map.add(wall_image(2.007), SE3.identity())
+    assert ground_map.keyframes == 2
+    assert len(ground_map.cloud()) > 100

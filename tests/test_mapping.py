@@ -28,8 +28,9 @@ from airground.core.messages import (
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.ground_map import GroundMap
-from airground.pipeline import FrontEnds, Mapping
+from airground.pipeline import Mapping
 from airground.slam.front_end import ScaleEstimate, TrackedPose, Tracking
+from airground.tracking import FrontEnds, Trackers
 
 CAMERA = PinholeCamera(160, 120, 130.0, 130.0, 79.5, 59.5)
 CALIBRATION = RobotCalibration(CAMERA, SE3.identity(), SE3.identity())
@@ -87,8 +88,16 @@ def ground_image(stamp_ns: int) -> GroundImage:
     )
 
 
-def mapping(mav: Scripted, ground: Scripted) -> Mapping:
-    return Mapping(CONFIG, CALIBRATION, CALIBRATION, FrontEnds(mav, ground))
+class Fed:
+    """Both trackers and the maps above them, fed message by message."""
+
+    def __init__(self, mav: Scripted, ground: Scripted) -> None:
+        self.trackers = Trackers(CALIBRATION, CALIBRATION, FrontEnds(mav, ground))
+        self.mapping = Mapping(CONFIG, CALIBRATION, CALIBRATION)
+
+    def add(self, stamped: Stamped) -> list[Event]:
+        (frame,) = self.trackers.frames([stamped])
+        return list(self.mapping.take(frame))
 
 
 def kinds(events: Sequence[Event]) -> list[type[Event]]:
@@ -102,7 +111,7 @@ def test_initializing_is_not_lost() -> None:
         unposed(2, Tracking.LOST),
         tracked(3, 0.0, corrected=True),
     ]
-    made = mapping(Scripted(answers), Scripted([]))
+    made = Fed(Scripted(answers), Scripted([]))
     events = [event for stamp in range(4) for event in made.add(mav_image(stamp))]
     assert kinds(events) == [Initializing, MavTracked, TrackingLost, MavTracked, PosesCorrected]
     assert [event.stamp_ns for event in events] == [0, 1, 2, 3, 3]
@@ -116,25 +125,25 @@ def test_initializing_is_not_lost() -> None:
 def test_the_ground_map_follows_corrected_poses() -> None:
     final = Trajectory.from_poses([0, 1], [at(0.05), at(0.2)])
     ground = Scripted([tracked(0, 0.0), tracked(1, 0.2, corrected=True)], final)
-    made = mapping(Scripted([]), ground)
+    made = Fed(Scripted([]), ground)
     images = [ground_image(stamp) for stamp in range(2)]
-    first = list(made.add(Stamped(Source.GROUND, images[0])))
+    first = made.add(Stamped(Source.GROUND, images[0]))
     assert kinds(first) == [GroundTracked, GroundMapExtended]
-    assert len(made.ground_cloud()) > 0
-    assert PosesCorrected in kinds(list(made.add(Stamped(Source.GROUND, images[1]))))
+    assert len(made.mapping.ground_cloud()) > 0
+    assert PosesCorrected in kinds(made.add(Stamped(Source.GROUND, images[1])))
     expected = GroundMap(CAMERA, CONFIG.ground_mapping)
     for image, pose in zip(images, (at(0.05), at(0.2)), strict=True):
         expected.add(image, pose)
-    assert made.ground_cloud().points.tobytes() == expected.cloud().points.tobytes()
+    assert made.mapping.ground_cloud().points.tobytes() == expected.cloud().points.tobytes()
 
 
 def test_what_the_front_ends_put_off_reaches_the_map_at_the_end() -> None:
     mav = Scripted([])
     ground = Scripted([tracked(0, 0.0)], Trajectory.from_poses([0], [at(0.5)]))
-    made = mapping(mav, ground)
-    list(made.add(Stamped(Source.GROUND, ground_image(0))))
-    before = made.ground_cloud().points[:, 0].mean()
-    list(made.flush())
+    made = Fed(mav, ground)
+    made.add(Stamped(Source.GROUND, ground_image(0)))
+    before = made.mapping.ground_cloud().points[:, 0].mean()
+    made.mapping.correct_ground(made.trackers.finish())
     assert mav.finished
     assert ground.finished
-    assert abs(made.ground_cloud().points[:, 0].mean() - before - 0.5) < 0.01
+    assert abs(made.mapping.ground_cloud().points[:, 0].mean() - before - 0.5) < 0.01

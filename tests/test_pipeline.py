@@ -29,8 +29,9 @@ from airground.core.messages import (
 )
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
-from airground.pipeline import FrontEnds, Pipeline
+from airground.pipeline import Pipeline
 from airground.slam.front_end import TrackedPose, Tracking
+from airground.tracking import FrontEnds, TrackedFrame, Trackers
 from tests.dense.synthetic import CAMERA, flight, heap_world, noisy
 
 GROUND_CAMERA = PinholeCamera(320, 240, 262.0, 262.0, 159.5, 119.5)
@@ -92,17 +93,19 @@ class Recorded:
         samples = MagneticSamples(stamps, np.tile(field, (5, 1)))
         self.messages += [Stamped(robot, samples), Stamped(robot, image)]
 
+    def frames(self, front_ends: FrontEnds) -> Iterator[TrackedFrame]:
+        trackers = Trackers(CALIBRATION["mav"], CALIBRATION["ground"], front_ends)
+        return trackers.frames(self.messages)
+
     def run(self, prior: SE3 | None = None) -> tuple[Pipeline, list[Event]]:
-        front_ends = FrontEnds(Known(self.mav), Known(self.ground))
-        pipeline = Pipeline(
-            Config(),
-            CALIBRATION["mav"],
-            CALIBRATION["ground"],
-            front_ends,
-            np.random.default_rng(0),
-            prior,
-        )
-        return pipeline, list(pipeline.run(self.messages))
+        pipeline = empty_pipeline(prior)
+        frames = self.frames(FrontEnds(Known(self.mav), Known(self.ground)))
+        return pipeline, list(pipeline.run(frames))
+
+
+def empty_pipeline(prior: SE3 | None = None) -> Pipeline:
+    rng = np.random.default_rng(0)
+    return Pipeline(Config(), CALIBRATION["mav"], CALIBRATION["ground"], rng, prior)
 
 
 def _around(count: int) -> Iterator[SE3]:
@@ -186,15 +189,9 @@ def test_same_seed_same_bytes(recorded: Recorded, found: tuple[Pipeline, list[Ev
 @pytest.mark.slow
 def test_lost_tracking_is_told_and_maps_nothing(recorded: Recorded) -> None:
     lost = dict.fromkeys(recorded.mav)
-    front_ends = FrontEnds(Known(lost), Known(recorded.ground))
-    pipeline = Pipeline(
-        Config(),
-        CALIBRATION["mav"],
-        CALIBRATION["ground"],
-        front_ends,
-        np.random.default_rng(0),
-    )
-    events = list(pipeline.run(recorded.messages))
+    pipeline = empty_pipeline()
+    frames = recorded.frames(FrontEnds(Known(lost), Known(recorded.ground)))
+    events = list(pipeline.run(frames))
     assert len(of(events, TrackingLost)) == len(lost)
     assert not of(events, SurfaceCast)
     assert (pipeline.augmented_map().sources == Source.GROUND).all()

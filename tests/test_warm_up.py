@@ -14,8 +14,10 @@ from airground.localization.particle_filter import MonteCarloLocalizer
 from airground.localization.warm_up import warm_up_localization
 from airground.refinement import refine
 from airground.refinement.warm_up import warm_up_refinement
+from airground.warm_up import warm_up_mapping
 from tests.compiled_kernels import compiled
 from tests.localization.synthetic import aerial_points, box_heap, ground_points
+from tests.test_pipeline import Recorded
 
 CONFIGS = {
     "best": Config(),
@@ -75,3 +77,13 @@ def test_threads_do_not_change_the_result(name: str, clouds: Clouds) -> None:
     finally:
         numba.set_num_threads(before)
     assert results[0] == results[-1]
+
+
+@pytest.mark.slow
+def test_mapping_compiles_nothing_after_the_warm_up() -> None:
+    rooms = ("airground.dense", "airground.ground_map", *ROOMS)
+    warm_up_mapping(Config(), np.random.default_rng(0))
+    before = compiled(*rooms)
+    assert sum(before.values()) > 10
+    Recorded().run()
+    assert compiled(*rooms) == before

@@ -104,6 +104,11 @@ class MagneticSamples:
             self, "field", read_only(self.field, "field", (len(stamps), 3), np.float64)
         )
 
+    def between(self, start_ns: int, end_ns: int) -> MagneticSamples:
+        """The samples with start_ns < stamp <= end_ns."""
+        lo, hi = np.searchsorted(self.stamps_ns, [start_ns, end_ns], side="right")
+        return MagneticSamples(self.stamps_ns[lo:hi], self.field[lo:hi])
+
 
 @dataclass(frozen=True)
 class ImuNoise:

@@ -108,7 +108,11 @@ class GroundMap:
 
     def _fuse(self, keyframe: GroundKeyframe) -> None:
         """Put a keyframe into the distance field."""
-        depth = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(keyframe.depth()))
+        self._fused += 1
+        measured = keyframe.depth()
+        if not measured.any():
+            return  # Open3D refuses an image that touches nothing
+        depth = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(measured))
         colours = keyframe.colour().astype(np.float32)
         colour = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(colours))
         T_camera_ground = o3d.core.Tensor.from_numpy(keyframe.T_ground_camera.inverse().matrix())
@@ -118,10 +122,9 @@ class GroundMap:
             depth, self._intrinsics, T_camera_ground, *reach
         )
         self._grid.integrate(blocks, depth, colour, self._intrinsics, T_camera_ground, *reach)
-        self._fused += 1
 
     def _extracted(self) -> PointCloud:
-        if self.keyframes == 0:
+        if self._grid.hashmap().size() == 0:
             return PointCloud.empty()
         extracted = self._grid.extract_point_cloud(self._config.min_keyframes - 0.5)
         if extracted.is_empty():

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,8 @@ from airground.io.plausibility import (
     upwards,
 )
 from airground.io.tum import read_associations
+
+NOTHING: Mapping[Source, Collection[int]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,21 +145,50 @@ class Recording:
         """PNG value of one metre of depth, as the pipeline is told."""
         return self.header.calibration.ground.depth.units_per_m
 
-    def messages(self) -> Iterator[Stamped]:
+    def messages(self, dropped: Mapping[Source, Collection[int]] = NOTHING) -> Iterator[Stamped]:
         """Every message of both robots in order of time.
 
         Before each image come the inertial and magnetic samples since the previous image
         of the same robot, one message each unless there are none.
 
+        Args:
+            dropped: Stamps [ns] of images to leave out, as if the robot had been too busy for
+                them; their samples come before the next image.
+
         Raises:
             RecordingError: An image cannot be read or does not fit the calibration.
         """
         streams = (
-            bundles(Source.GROUND, self.ground_images(), self.ground_imu, self.ground_magnetic),
-            bundles(Source.MAV, self.mav_images(), self.mav_imu, self.mav_magnetic),
+            bundles(source, self._images(source, dropped.get(source, ())), *self.samples(source))
+            for source in (Source.GROUND, Source.MAV)
         )
         for _, bundle in heapq.merge(*streams, key=lambda stamped_bundle: stamped_bundle[0]):
             yield from bundle
+
+    def calibration(self, robot: Source) -> RobotCalibration:
+        """What the pipeline is told about a robot's sensors."""
+        return self.mav if robot == Source.MAV else self.ground
+
+    def stamps_ns(self, robot: Source) -> NDArray[np.int64]:
+        """(N,) stamps of a robot's images [ns]."""
+        return self.mav_camera_stamps if robot == Source.MAV else self.ground_camera_stamps
+
+    def samples(self, robot: Source) -> tuple[ImuSamples, MagneticSamples]:
+        """All that a robot's other sensors measured."""
+        if robot == Source.MAV:
+            return self.mav_imu, self.mav_magnetic
+        return self.ground_imu, self.ground_magnetic
+
+    def read_image(self, robot: Source, index: int) -> MavImage | GroundImage:
+        """A robot's image at an index in its `stamps_ns`."""
+        if robot == Source.MAV:
+            return self.read_mav_image(index)
+        return self.read_ground_image(index)
+
+    def _images(self, robot: Source, dropped: Collection[int]) -> Iterator[MavImage | GroundImage]:
+        for index, stamp in enumerate(self.stamps_ns(robot).tolist()):
+            if stamp not in dropped:
+                yield self.read_image(robot, index)
 
     def mav_images(self) -> Iterator[MavImage]:
         for index in range(len(self.mav_camera_stamps)):

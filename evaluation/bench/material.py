@@ -28,12 +28,12 @@ from airground.core.messages import GroundImage
 from airground.core.se3 import SE3
 from airground.core.surface import AerialSurface, DepthMap
 from airground.dense.view_selection import PosedImage
-from airground.dense.warm_up import warm_up
 from airground.errors import InputError
 from airground.io.recording import Recording
-from airground.pipeline import FrontEnds, Pipeline, Sighting, sight
+from airground.pipeline import Pipeline, Sighting, sight
 from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
-from airground.slam.warm_up import warm_up_slam
+from airground.tracking import FrontEnds, Trackers
+from airground.warm_up import warm_up
 from evaluation.watched_front_end import WatchedFrontEnd
 
 ALIGNED_SURFACES = 3
@@ -110,8 +110,7 @@ class Played:
 
 def compile_stages(config: Config) -> None:
     """Compile what the pipeline needs, so that it is in nobody's time or memory."""
-    warm_up(config)
-    warm_up_slam(np.random.default_rng(0))
+    warm_up(config, np.random.default_rng(0))
 
 
 def play(recording: Recording, config: Config, whole: bool) -> tuple[Material, Played]:
@@ -130,11 +129,11 @@ def play(recording: Recording, config: Config, whole: bool) -> tuple[Material, P
     ground = WatchedFrontEnd(
         make_front_end(GROUND, "slam", Ingredients(recording.ground, config, ground_rng))
     )
-    front_ends = FrontEnds(mav, ground)
-    pipeline = Pipeline(config, recording.mav, recording.ground, front_ends, rng)
+    trackers = Trackers(recording.mav, recording.ground, FrontEnds(mav, ground))
+    pipeline = Pipeline(config, recording.mav, recording.ground, rng)
     gathering = _Gathering(recording, config, pipeline)
     started, cpu = time.perf_counter(), time.process_time()
-    for event in pipeline.run(recording.messages()):
+    for event in pipeline.run(trackers.frames(recording.messages())):
         gathering.take(event)
         if gathering.complete and not whole:
             break

@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
 from airground.errors import InputError
 from evaluation.commands.alone import AloneWords
+from evaluation.commands.realtime import RealtimeWords
 from evaluation.commands.words import OutWord, SeedWord, SetupWords, Verb
+
+if TYPE_CHECKING:
+    from airground.io.recording import Recording
+    from evaluation.realtime.drops import DropList
+    from evaluation.run import RunResult
+    from evaluation.setups import Setup
+
+DROPPED = "dropped.json"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run(Verb, AloneWords, SetupWords, SeedWord, OutWord):
+class Run(Verb, AloneWords, RealtimeWords, SetupWords, SeedWord, OutWord):
     """Run the pipeline over a recording and measure it against the truth.
 
     Leaves the augmented map and both robots' paths beside the measurements and the report.
-    With --only it tracks one robot, and leaves its trajectory.
+    With --only it tracks one robot, and leaves its trajectory. With --realtime the recording
+    is played at its own rate, and dropped.json says which frames were too many.
     """
 
     recording: Annotated[Positional[Path], arg(metavar="RECORDING")]
@@ -26,6 +36,7 @@ class Run(Verb, AloneWords, SetupWords, SeedWord, OutWord):
 
     def main(self) -> None:
         self.check_alone_words()
+        self.check_realtime_words(self.only)
         if self.only is not None:
             self.run_one(self.recording, self.out, self.resolved_config(), self.checked_seed())
         else:
@@ -33,25 +44,37 @@ class Run(Verb, AloneWords, SetupWords, SeedWord, OutWord):
 
     def _run_both(self) -> None:
         from airground.io.layout import HEADER
-        from airground.io.ply import write_ply
         from airground.io.recording import Recording
         from evaluation.output import fresh_folder
         from evaluation.results_folder import Results
-        from evaluation.run import run_recording, write_trajectories
+        from evaluation.run import write_run
         from evaluation.screen import print_summary
-        from sim.truth import Truth
 
         if self.recording.is_dir() and not (self.recording / HEADER).exists():
             raise InputError(
                 f"{self.recording}: has no {HEADER}; both robots run from a recording that "
                 "simulate has written, one alone from EuRoC or TUM RGB-D with --only"
             )
-        setup, seed = self.setup(), self.checked_seed()
+        setup, seed = replace(self.setup(), variant=self.variant()), self.checked_seed()
         with fresh_folder(self.out) as folder:
             recording = Recording.open(self.recording)
-            result = run_recording(recording, Truth.open(self.recording), setup, seed)
-            augmented = result.augmented
-            write_ply(folder / "augmented_map.ply", augmented.cloud_ground, augmented.sources)
-            write_trajectories(folder, recording, result.tracked)
+            result, drops = self._result(recording, setup, seed)
+            write_run(folder, recording, result)
+            drops.write(folder / DROPPED)
             summary = Results(result.table, setup.config, seed).write(folder)
         print_summary(summary)
+
+    def _result(self, recording: Recording, setup: Setup, seed: int) -> tuple[RunResult, DropList]:
+        """What the run leaves, and which frames it did without."""
+        from evaluation.realtime.drops import DropList, nothing_dropped
+        from evaluation.realtime.live_run import run_live
+        from evaluation.run import run_recording
+        from sim.truth import Truth
+
+        truth = Truth.open(recording.path)
+        if self.realtime:
+            return run_live(recording, truth, setup, seed, self.playback())
+        drops = nothing_dropped(recording)
+        if self.drops is not None:
+            drops = DropList.read(self.drops, recording)
+        return run_recording(recording, truth, setup, seed, drops), drops

@@ -27,7 +27,8 @@ def test_every_key_of_the_contract_is_there(table: ResultTable, tmp_path: Path) 
     made = json.loads((tmp_path / "summary.json").read_text())
     assert list(made) == [
         "schema", "version", "git_revision", "preset", "poses", "seed", "scenes", "machine",
-        "slam", "surface", "localization", "refinement", "timing_ms", "real_time_factor",
+        "slam", "surface", "localization", "refinement", "timing_ms",
+        "real_time_factor", "realtime",
     ]  # fmt: skip
     assert made["machine"] == {"cpu": "some processor", "cores": 2}
     promised = {"ate_sim3_rmse_m", "ate_se3_rmse_m", "scale_error", "tracked_fraction", "path_m"}

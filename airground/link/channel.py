@@ -1,0 +1,88 @@
+"""A one-way channel over a loopback socket that never makes its sender wait.
+
+The receiver acknowledges every message that it is done with. So the sender knows how many
+are under way, and leaves out what the receiver has no time for, instead of blocking or of
+filling the memory. Either side may die: the other one notices nothing but silence.
+"""
+
+from __future__ import annotations
+
+import contextlib
+
+import zmq
+
+LOOPBACK = "tcp://127.0.0.1"
+LAST_WORDS_MS = 5000
+"""How long what was sent last may take to leave a closing channel."""
+
+
+class Sender:
+    """The end that sends.
+
+    Args:
+        address: Of the receiver.
+        capacity: Messages that may be under way at a time.
+
+    Attributes:
+        under_way: Messages sent and not yet acknowledged.
+        most_under_way: The most there ever were.
+    """
+
+    def __init__(self, address: str, capacity: int) -> None:
+        self._socket: zmq.Socket[bytes] = zmq.Context.instance().socket(zmq.DEALER)
+        # The bound is `capacity`: the last message of all must get through beyond it.
+        self._socket.set_hwm(0)
+        self._socket.setsockopt(zmq.LINGER, LAST_WORDS_MS)
+        self._socket.connect(address)
+        self._capacity = capacity
+        self.under_way = self.most_under_way = 0
+
+    def has_room(self) -> bool:
+        """Whether one more message may be sent."""
+        while self._socket.poll(0, zmq.POLLIN):
+            self._socket.recv(zmq.NOBLOCK)
+            self.under_way -= 1
+        return self.under_way < self._capacity
+
+    def send(self, parts: list[bytes]) -> None:
+        """Hand a message over to be sent; returns at once."""
+        self._socket.send_multipart(parts, zmq.NOBLOCK)
+        self.under_way += 1
+        self.most_under_way = max(self.most_under_way, self.under_way)
+
+    def close(self) -> None:
+        """Nothing more will be sent; what was, still leaves."""
+        self._socket.close()
+
+
+class Receiver:
+    """The end that receives; bound to the loopback interface, at a port that is free.
+
+    Attributes:
+        address: Where a sender connects to.
+    """
+
+    def __init__(self) -> None:
+        self._socket: zmq.Socket[bytes] = zmq.Context.instance().socket(zmq.DEALER)
+        self._socket.set_hwm(0)
+        self._socket.setsockopt(zmq.LINGER, 0)
+        self.address = f"{LOOPBACK}:{self._socket.bind_to_random_port(LOOPBACK)}"
+
+    def wait(self, timeout_s: float) -> bool:
+        """Wait until a message is there; False where none came in time."""
+        return bool(self._socket.poll(max(0, round(timeout_s * 1e3)), zmq.POLLIN))
+
+    def receive(self) -> list[bytes] | None:
+        """The next message, None while there is none."""
+        if not self.wait(0):
+            return None
+        return self._socket.recv_multipart(zmq.NOBLOCK)
+
+    def acknowledge(self) -> None:
+        """One more message is done with."""
+        with contextlib.suppress(zmq.Again):  # the sender is gone, and does not care
+            self._socket.send(b"", zmq.NOBLOCK)
+
+    def close(self) -> None:
+        """Nobody will receive any more."""
+        self._socket.close()

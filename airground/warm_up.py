@@ -1,0 +1,29 @@
+"""Compiles what all stages need before the first frame is waiting for it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from airground.config import Config
+from airground.dense.warm_up import warm_up_dense
+from airground.localization.warm_up import warm_up_localization
+from airground.refinement.warm_up import warm_up_refinement
+from airground.slam.warm_up import warm_up_slam
+
+
+def warm_up(config: Config, rng: np.random.Generator) -> None:
+    """Compile tracking and mapping.
+
+    Args:
+        config: What will run.
+        rng: Draws what it is tried on.
+    """
+    warm_up_slam(rng)
+    warm_up_mapping(config, rng)
+
+
+def warm_up_mapping(config: Config, rng: np.random.Generator) -> None:
+    """Compile everything above tracking; arguments as in `warm_up`."""
+    warm_up_dense(config)
+    warm_up_localization(config, rng)
+    warm_up_refinement(config)

@@ -1,0 +1,129 @@
+"""One robot's side as a process of its own: camera, inertial sensor, tracking, uplink."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import threading
+from dataclasses import dataclass
+from multiprocessing.connection import Connection, wait
+from pathlib import Path
+
+import numpy as np
+
+from airground.core.cloud import Source
+from airground.core.trajectory import Trajectory
+from airground.errors import AirgroundError
+from airground.io.recording import Recording
+from airground.link.channel import Sender
+from airground.slam.warm_up import warm_up_slam
+from airground.tracking import RobotTracker
+from evaluation.environment import prepare
+from evaluation.experiment import peak_memory_mib
+from evaluation.front_ends import front_ends_for
+from evaluation.realtime.clock import PlaybackClock
+from evaluation.realtime.player import Played, play
+from evaluation.realtime.radio import Radio, RadioLimits
+from evaluation.realtime.uplink import Uplink
+from evaluation.run import front_end_rng
+from evaluation.setups import Setup
+from evaluation.watched_front_end import FrontEndLog
+from sim.truth import Truth
+
+
+@dataclass(frozen=True)
+class TrackerTask:
+    """What a robot is to do.
+
+    Attributes:
+        recording: Where its recording is.
+        robot: Which one it is.
+        setup, seed: As in a run offline.
+        waiting_frames: How many images may wait before its tracker.
+        frames_under_way: How many frames the mapper may still have before it.
+        radio: What lies between it and the mapper, None for one computer.
+        address: Where the mapper listens.
+    """
+
+    recording: Path
+    robot: Source
+    setup: Setup
+    seed: int
+    waiting_frames: int
+    frames_under_way: int
+    radio: RadioLimits | None
+    address: str
+
+
+@dataclass(frozen=True)
+class TrackerReport:
+    """What a robot tells when all is over.
+
+    Attributes:
+        log, final: What its front end said, image by image and at last.
+        played: How it lived through the recording.
+        shed_ns, lost_ns: Stamps of frames for which the mapper had no room, and of those
+            that the radio lost.
+        sent_bytes: How much it sent.
+        most_under_way: The most frames that the mapper ever had before it.
+        peak_memory_mib: The most memory that the process held.
+    """
+
+    log: FrontEndLog
+    final: Trajectory | None
+    played: Played
+    shed_ns: list[int]
+    lost_ns: list[int]
+    sent_bytes: int
+    most_under_way: int
+    peak_memory_mib: float
+
+
+def live(task: TrackerTask, pipe: Connection) -> None:
+    """What the process does: says None when it is ready, is told the clock, and reports.
+
+    What the user can mend is sent in place of an answer.
+    """
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    prepare(1)
+    try:
+        pipe.send(_report(task, pipe))
+    except AirgroundError as error:
+        pipe.send(error)
+
+
+def _report(task: TrackerTask, pipe: Connection) -> TrackerReport:
+    recording = Recording.open(task.recording)
+    truth = Truth.open(task.recording)
+    watched = front_ends_for(task.setup, recording, truth, front_end_rng(task.seed))
+    tracker = RobotTracker(task.robot, recording.calibration(task.robot), watched.of(task.robot))
+    radio = None
+    if task.radio is not None:
+        radio = Radio(task.radio, np.random.default_rng([task.seed, 1]))
+    sender = Sender(task.address, task.frames_under_way)
+    uplink = Uplink(sender, radio, task.radio.jpeg_quality if task.radio else None)
+    if task.robot.name.lower() in task.setup.slam_robots():
+        warm_up_slam(np.random.default_rng(0))
+    pipe.send(None)
+    clock: PlaybackClock = pipe.recv()
+    played = play(recording, task.robot, tracker, clock, task.waiting_frames, uplink.offer)
+    final = tracker.finish()
+    uplink.close(final)
+    return TrackerReport(
+        watched.of(task.robot).log(),
+        final,
+        played,
+        uplink.shed,
+        uplink.lost,
+        uplink.sent_bytes,
+        sender.most_under_way,
+        peak_memory_mib(),
+    )
+
+
+def _end_with_parent() -> None:
+    """Nobody is left alone when the process that started it is killed."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    wait([parent.sentinel])
+    os._exit(1)
