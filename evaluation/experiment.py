@@ -92,14 +92,15 @@ def run_task(task: Task) -> Outcome:
         _add_trials(out, maps, truth, setup, task)
         if task.budget and setup is task.setups[0]:
             add_error_budget(out, recording, truth, setup, maps, (task.seed, task.flight))
-        if task.baselines and setup is task.setups[0]:
+        if task.baselines and task.protocol.baselines and setup is task.setups[0]:
             counts = (task.protocol.trials, task.protocol.baselines)
             seed = (task.seed, task.flight)
             add_baselines(out, recording, truth, setup.config, maps, seed, counts)
         rows += out.rows
     showcase = None
     if task.showcase:
-        showcase = make_showcase(recording, truth, maps, task.setups[0], task.seed)
+        match = task.baselines and task.protocol.baselines > 0
+        showcase = make_showcase(recording, truth, maps, task.setups[0], task.seed, match)
     return Outcome(rows, showcase)
 
 

@@ -74,6 +74,7 @@ def reproduce(plan: Plan, recordings: Path, workers: int | None = None) -> Findi
                         plan.protocol,
                         showcase=not tasks,
                         budget=plan.budget and setups[0] is plan.setups[0],
+                        baselines=setups[0] is plan.setups[0],
                     )
                 )
     return _measured(tasks, workers or usable_cores())

@@ -124,7 +124,7 @@ def _near(
 
 
 def _rigid_motions(source: NDArray, target: NDArray) -> tuple[NDArray, NDArray]:
-    """Least-squares rotations (B, 3, 3) and translations (B, 3) of point sets (B, n, 3) (Kabsch)."""
+    """Least squares (Kabsch): (B, 3, 3) rotations and (B, 3) shifts of point sets (B, n, 3)."""
     mean_source, mean_target = source.mean(axis=1), target.mean(axis=1)
     centred_source = source - mean_source[:, None]
     covariance = (target - mean_target[:, None]).transpose(0, 2, 1) @ centred_source

@@ -54,4 +54,4 @@ def kiss_matcher_icp(given: Given) -> Answer:
 
 def _above(points: NDArray) -> NDArray[np.float64]:
     """(3,) a point high above the middle of a cloud, to which its normals are turned."""
-    return points.mean(axis=0) + [0.0, 0.0, ABOVE_M]
+    return points.mean(axis=0) + np.array([0.0, 0.0, ABOVE_M])

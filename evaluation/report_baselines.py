@@ -1,0 +1,72 @@
+"""Baselines beside ours: who finds the MAV from one aerial map, and who errs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from evaluation.baselines.measure import STAGE
+from evaluation.baselines.seam import Baseline
+from evaluation.baselines.table import BASELINES
+from evaluation.report_tables import MISSING, TextTable, degrees, metres, milliseconds, rate
+from evaluation.results import TRIAL_KEYS, ResultTable
+from evaluation.statistics import quantile, wilson
+
+NEAR_M = 0.25
+"""A claim farther off than this in the horizontal plane is a wrong claim."""
+
+
+def baseline_table(table: ResultTable) -> TextTable:
+    """One row a baseline; no rows where none was tried (of one condition)."""
+    rows = [row for row in (_row(table, baseline) for baseline in BASELINES) if row is not None]
+    header = (
+        "method",
+        "is given",
+        "n",
+        "claims a place within 0.25 m",
+        "wrong claims",
+        "claims within 5 cm and 2°",
+        "best guess within 0.25 m",
+        "best guess, median error",
+        "median time [ms]",
+    )
+    return TextTable(header, tuple(rows))
+
+
+def _row(table: ResultTable, baseline: Baseline) -> tuple[str, ...] | None:
+    missing = table.rows(STAGE, f"{baseline.name}_missing")
+    if len(missing):
+        not_run = f"not run\n{missing['note'].iloc[0]}"
+        return (baseline.title, baseline.given, "0", not_run, *[MISSING] * 5)
+    trials = baseline_trials(table, baseline.name)
+    if len(trials) == 0:
+        return None
+    n = len(trials)
+    claimed = trials["claimed"] > 0
+    near = trials["horizontal_m"] <= NEAR_M
+    precise = (trials["translation_m"] <= 0.05) & (trials["rotation_deg"] <= 2.0)
+    middle = quantile(trials["translation_m"], 0.5), quantile(trials["rotation_deg"], 0.5)
+    return (
+        baseline.title,
+        baseline.given,
+        str(n),
+        rate(wilson(int((claimed & near).sum()), n)),
+        rate(wilson(int((claimed & ~near).sum()), n)),
+        rate(wilson(int((claimed & precise).sum()), n)),
+        rate(wilson(int(near.sum()), n)),
+        f"{metres(middle[0])}\n{degrees(middle[1])}",
+        milliseconds(quantile(trials["ms"], 0.5)),
+    )
+
+
+def baseline_trials(table: ResultTable, name: str) -> pd.DataFrame:
+    """One row a trial with columns claimed, horizontal_m, translation_m, rotation_deg and ms.
+
+    What has no guess has NaN errors, which lie within no limit.
+    """
+    columns = ("claimed", "horizontal_m", "translation_m", "rotation_deg", "ms")
+    metrics = {f"{name}_{column}": column for column in columns}
+    frame = table.frame[(table.frame["stage"] == STAGE) & table.frame["metric"].isin(metrics)]
+    keys = [key for key in TRIAL_KEYS if key != "sequence"]
+    wide = frame.pivot(index=keys, columns="metric", values="value").rename(columns=metrics)
+    return wide.reindex(columns=list(columns)).astype(np.float64)
