@@ -22,7 +22,7 @@ from evaluation.baselines.registration import (
 )
 from evaluation.baselines.seam import Answer, Given
 
-SAMPLES = 200_000
+SAMPLES = 100_000
 """Triples of matches that are tried."""
 EDGE_SIMILARITY = 0.9
 """Sides of the two triangles of a triple must agree this well, as Open3D's checker asks."""
