@@ -79,7 +79,7 @@ def write_report(
         pictures=pictures,
         trajectories=trajectory_table(table, shown),
         budget=budget_table(measured),
-        baselines=baseline_table(measured),
+        baselines=baseline_table(primary),
         timing=timing_table(measured),
         by_scene=scene_table(primary),
         controls=control_table(table, shown),

@@ -103,7 +103,7 @@ class Baseline:
         prior: The first guess that it gets.
         views: Whether it gets both robots' images. Which of the ground robot's are near is
             told by the noisy prior, which spares it a search that ours has to do.
-        package: What must be installed beyond the core; empty if nothing.
+        module: What it imports beyond the core (the extra `baselines`); empty if nothing.
     """
 
     name: str
@@ -112,4 +112,4 @@ class Baseline:
     locate: Callable[[Given], Answer]
     prior: Prior = "none"
     views: bool = False
-    package: str = ""
+    module: str = ""

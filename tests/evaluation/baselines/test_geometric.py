@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -22,17 +21,16 @@ from tests.evaluation.baselines.closed_worlds import (
     given_of,
 )
 
-MODULE_OF = {"scikit-image": "skimage", "kiss-matcher": "kiss_matcher"}
 ON_HEIGHTS = ("zmssd", "ncc", "phase", "ours_first")
 ON_CLOUDS = ("fpfh", "kiss", "ours_global", "icp", "ours_refined", "oracle")
 CELL_M = 0.04
 
 
 def answered(name: str, given: Given) -> Answer:
-    """What a baseline says; skips where its package is missing."""
+    """What a baseline says; skips where what it imports is missing."""
     baseline = named(name)
-    if baseline.package and find_spec(MODULE_OF[baseline.package]) is None:
-        pytest.skip(f"{baseline.package} is not installed")
+    if baseline.module:
+        pytest.importorskip(baseline.module)
     return baseline.locate(given)
 
 

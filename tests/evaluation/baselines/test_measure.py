@@ -69,9 +69,9 @@ def moved_by(x_m: float) -> SE3:
     return SE3(T_GROUND_MAV.rotation, T_GROUND_MAV.translation + np.array([x_m, 0, 0]))
 
 
-def rows_of(answers: list[Answer], name: str = "icp") -> ResultTable:
+def rows_of(answers: list[Answer], name: str = "icp", scene: str = "indoor_a") -> ResultTable:
     given = given_of(boxes_on_floor(0.1))
-    out = RowWriter("indoor_a", 0, 0, CONDITION)
+    out = RowWriter(scene, 0, 0, CONDITION)
     for trial, answer in enumerate(answers):
         measure._add_answer(
             out, name, answer, 10.0 * trial, given.sighting, closed_truth(given), trial  # type: ignore[arg-type]
@@ -99,6 +99,16 @@ def test_wrong_claims_are_counted_apart_from_abstentions() -> None:
     assert cells["median time [ms]"] == "20.0"
 
 
+def test_claims_where_nothing_is_to_find_are_counted_by_themselves() -> None:
+    lost = [Answer(moved_by(0.0)), Answer(moved_by(1.0)), Answer(None, "too flat")]
+    table = ResultTable.concat([rows_of([Answer(moved_by(0.0))]), rows_of(lost, scene="flat")])
+    shown = baseline_table(table)
+    cells = dict(zip(shown.header, shown.rows[0], strict=True))
+    assert cells["n"] == "1"
+    assert cells["claims on flat ground"].startswith("66.7 %\n2 of 3")
+    assert "claims on flat ground" not in baseline_table(rows_of(lost[:1])).header
+
+
 def test_no_guess_at_all_is_a_failure_in_the_median() -> None:
     answers = [Answer(None, "no idea"), Answer(None, "no idea"), Answer(moved_by(0.0))]
     (row,) = baseline_table(rows_of(answers)).rows
@@ -112,18 +122,18 @@ def test_reasons_stay_in_the_rows() -> None:
     assert list(rows["value"]) == [0.0]
 
 
-def test_a_missing_package_is_said_and_not_counted() -> None:
+def test_a_missing_module_is_said_and_not_counted() -> None:
     out = RowWriter("indoor_a", 0, 0, CONDITION)
-    reason = "the package kiss-matcher is not installed"
+    reason = "kiss_matcher is not installed"
     out.add("baseline", "kiss_missing", 1.0, "", note=reason)
     (row,) = baseline_table(ResultTable.from_rows(out.rows)).rows
     assert row[3] == f"not run\n{reason}"
 
 
-def test_installed_packages_are_looked_up() -> None:
-    made_up = Baseline("x", "x", "x", echo, package="airground-no-such-package")
+def test_what_is_not_installed_is_found_out() -> None:
+    made_up = Baseline("x", "x", "x", echo, module="airground_no_such_module")
     assert not measure._is_installed(made_up)
-    assert measure._is_installed(Baseline("x", "x", "x", echo, package="numpy"))
+    assert measure._is_installed(Baseline("x", "x", "x", echo, module="numpy.linalg"))
     assert measure._is_installed(BASELINES[0])
 
 
