@@ -9,9 +9,12 @@ import pytest
 
 from airground.config import Config
 from airground.core.se3 import SE3
+from airground.errors import InputError
 from evaluation.baselines import measure
 from evaluation.baselines.seam import Answer, Baseline, Given
 from evaluation.baselines.table import BASELINES
+from evaluation.cli import parse
+from evaluation.commands.reproduce import Reproduce
 from evaluation.report_baselines import baseline_table, baseline_trials
 from evaluation.results import Condition, ResultTable
 from evaluation.row_writer import RowWriter
@@ -149,3 +152,19 @@ def test_trials_are_spread_evenly() -> None:
     assert trial_sightings(0, 12) == []
     assert spread_evenly(12, 3) == [0, 6, 11]
     assert spread_evenly(12, 12) == list(range(12))
+
+
+@pytest.mark.parametrize(
+    ("words", "count"), [((), 12), (("--quick",), 0), (("--quick", "--baselines", "3"), 3)]
+)
+def test_reproduce_says_on_how_many_trials(words: tuple[str, ...], count: int) -> None:
+    verb = parse("reproduce", ["--out", "x", *words])
+    assert isinstance(verb, Reproduce)
+    assert verb.plan().protocol.baselines == count
+
+
+def test_a_negative_number_of_trials_is_refused() -> None:
+    verb = parse("reproduce", ["--out", "x", "--baselines", "-1"])
+    assert isinstance(verb, Reproduce)
+    with pytest.raises(InputError, match="--baselines -1"):
+        verb.plan()
