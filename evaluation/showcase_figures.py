@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from evaluation.baselines.matched_images import MatchedImages
 from evaluation.figures.fig02_views import views_figure
-from evaluation.figures.fig03_matches import matches_figure
+from evaluation.figures.fig03_matches import DRAWN, matches_figure
 from evaluation.figures.fig05_15_augmented import augmented_figure
 from evaluation.figures.fig06_depth_maps import depth_maps_figure
 from evaluation.figures.fig07_height_maps import height_maps_figure
@@ -88,7 +88,8 @@ def _matches(matched: MatchedImages, conditions: str) -> ReportFigure:
         "fig03_matches",
         "Fig. 3: feature matching between aerial and ground image",
         "ASIFT with the ratio test. Green: matches that agree on one pose of the MAV's camera, "
-        f"given the ground robot's depth ({verdict} to claim it); red: the others. Of "
+        f"given the ground robot's depth ({verdict} to claim it); red: the others; at most "
+        f"{DRAWN} of each are drawn. Of "
         f"{matched.views} ground views near the place, the one with most green ones. The paper "
         f"found matches indoors on planar textured surfaces, and none outdoors. {conditions}",
         matches_figure(matched),

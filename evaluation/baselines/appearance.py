@@ -20,6 +20,8 @@ RATIO = 0.8
 REPROJECTION_PX = 4.0
 ITERATIONS = 5_000
 CONFIDENCE = 0.9999
+SAME_PLACE_PX = 4.0
+"""Matches that begin and end in the same squares of this side count once."""
 MIN_INLIERS = 12
 """Fewer matches that agree on a pose are taken for chance."""
 
@@ -79,8 +81,10 @@ def matches_of(
         ground_px, ground_words = _features(view.grey, detector)
         pairs = _pairs(aerial_words, ground_words)
         points, seen = _points_map(view, ground_px[pairs[:, 1]])
-        pairs = pairs[seen]
-        made.append(Matches(aerial_px[pairs[:, 0]], ground_px[pairs[:, 1]], points[seen]))
+        pairs, points = pairs[seen], points[seen]
+        kept = _distinct(aerial_px[pairs[:, 0]], ground_px[pairs[:, 1]])
+        pairs, points = pairs[kept], points[kept]
+        made.append(Matches(aerial_px[pairs[:, 0]], ground_px[pairs[:, 1]], points))
     return made
 
 
@@ -138,6 +142,16 @@ def _pairs(aerial: NDArray[np.float32], ground: NDArray[np.float32]) -> NDArray[
         if best.distance < RATIO * second.distance
     ]
     return np.array(pairs, np.int64).reshape(-1, 2)
+
+
+def _distinct(aerial_px: NDArray, ground_px: NDArray) -> NDArray[np.int64]:
+    """Indices of matches (N, 2) between other pixels than those before them.
+
+    Simulated views find one corner many times, which would pass for agreement.
+    """
+    places = np.floor(np.hstack([aerial_px, ground_px]) / SAME_PLACE_PX).astype(np.int64)
+    _, first = np.unique(places, axis=0, return_index=True)
+    return np.sort(first)
 
 
 def _points_map(view: View, pixels: NDArray) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:

@@ -9,8 +9,11 @@ from numpy.typing import NDArray
 
 from evaluation.baselines.matched_images import MatchedImages
 from evaluation.figures.style import SERIES, picture_axes, styled
+from evaluation.trials import spread_evenly
 
 GAP_PX = 16
+DRAWN = 120
+"""Lines of a kind at most, spread evenly over the matches: more would hide the images."""
 AGREEING, OTHERS = SERIES[2], "#D62246"
 
 
@@ -25,13 +28,14 @@ def matches_figure(matched: MatchedImages) -> Figure:
     axes.imshow(picture, cmap="gray", vmin=0, vmax=255)
     lines = np.stack([matched.aerial_px, matched.ground_px + shift], axis=1)
     for kept, colour, thickness, opacity in (
-        (~matched.agrees, OTHERS, 0.5, 0.35),
-        (matched.agrees, AGREEING, 0.9, 0.9),
+        (~matched.agrees, OTHERS, 0.5, 0.4),
+        (matched.agrees, AGREEING, 0.7, 0.8),
     ):
+        drawn = lines[_some(np.flatnonzero(kept))]
         axes.add_collection(
-            LineCollection(list(lines[kept]), colors=colour, linewidths=thickness, alpha=opacity)
+            LineCollection(list(drawn), colors=colour, linewidths=thickness, alpha=opacity)
         )
-        axes.plot(*lines[kept].reshape(-1, 2).T, ".", color=colour, alpha=opacity, markersize=2.5)
+        axes.plot(*drawn.reshape(-1, 2).T, ".", color=colour, alpha=opacity, markersize=2.5)
     axes.set_xlim(-0.5, picture.shape[1] - 0.5)
     axes.set_ylim(picture.shape[0] - 0.5, -0.5)
     axes.set_title(
@@ -40,6 +44,10 @@ def matches_figure(matched: MatchedImages) -> Figure:
     )
     picture_axes(axes)
     return figure
+
+
+def _some(indices: NDArray[np.int64]) -> NDArray[np.int64]:
+    return indices[spread_evenly(len(indices), DRAWN)]
 
 
 def _side_by_side(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from evaluation.baselines.appearance import locate_camera, matches_of
+from evaluation.baselines.appearance import _distinct, locate_camera, matches_of
 from evaluation.baselines.matched_images import MatchedImages
 from evaluation.baselines.seam import View
 from evaluation.baselines.sift import sift
@@ -95,6 +95,13 @@ def test_features_without_depth_are_not_matched() -> None:
     assert len(matches[0].aerial_px) > 12
     assert len(matches[1].aerial_px) == 0
     assert locate_camera(aerial, matches[1:]).T_ground_camera is None
+
+
+def test_a_corner_found_many_times_counts_once() -> None:
+    once = np.array([[10.0, 10.0], [50.0, 30.0], [10.0, 10.0]])
+    many = np.repeat(once, 20, axis=0) + np.linspace(0, 1, 60)[:, None]
+    other = np.repeat([[5.0, 5.0], [70.0, 80.0], [90.0, 5.0]], 20, axis=0)
+    assert list(_distinct(many, other)) == [0, 20, 40]
 
 
 def test_a_black_image_has_no_features() -> None:
