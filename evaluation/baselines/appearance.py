@@ -118,7 +118,7 @@ def locate_camera(aerial: View, matches: list[Matches]) -> Located:
     rotation = nearest_rotation(cv2.Rodrigues(turn)[0])
     if not (np.isfinite(rotation).all() and np.isfinite(shift).all()):
         return Located(None, inliers)
-    return Located(SE3(rotation, shift.ravel()).inverse(), inliers)
+    return Located(SE3(rotation, np.asarray(shift, np.float64).ravel()).inverse(), inliers)
 
 
 def _features(
@@ -128,7 +128,7 @@ def _features(
     keypoints, words = detector.detectAndCompute(grey, None)
     if words is None or len(keypoints) == 0:
         return np.empty((0, 2)), np.empty((0, 128), np.float32)
-    return cv2.KeyPoint.convert(keypoints).astype(np.float64), words.astype(np.float32)
+    return np.asarray(cv2.KeyPoint.convert(keypoints), np.float64), words.astype(np.float32)
 
 
 def _pairs(aerial: NDArray[np.float32], ground: NDArray[np.float32]) -> NDArray[np.int64]:

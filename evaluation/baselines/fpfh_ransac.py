@@ -66,8 +66,11 @@ def _featured(points: NDArray) -> tuple[NDArray[np.float64], o3d.pipelines.regis
     search = o3d.geometry.KDTreeSearchParamHybrid
     cloud.estimate_normals(search(NORMAL_RADIUS_M, 30))
     cloud.orient_normals_to_align_with_direction((0.0, 0.0, 1.0))
-    feature = o3d.pipelines.registration.compute_fpfh_feature(cloud, search(FEATURE_RADIUS_M, 100))
-    return kept, feature
+    features = o3d.pipelines.registration.compute_fpfh_feature(
+        cloud,
+        search(FEATURE_RADIUS_M, 100),
+    )  # type: ignore[call-arg]  # its stub forgets a default
+    return kept, features
 
 
 def ransac(
