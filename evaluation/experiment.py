@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from airground.io.recording import Recording
+from evaluation.baselines.measure import add_baselines
 from evaluation.error_budget import add_error_budget
 from evaluation.mapping_pass import Maps, map_recording
 from evaluation.results import Row
@@ -24,6 +25,7 @@ from evaluation.trials import (
     localize_sequence,
     refine_sighting,
     sequence_starts,
+    trial_sightings,
 )
 from sim.rendered import Flight, rendered
 from sim.truth import Truth
@@ -36,10 +38,12 @@ class Protocol:
     Attributes:
         sequences: Sequences of 12 aerial maps, spread evenly over the flight.
         trials: Refinements from a noisy start, likewise.
+        baselines: How many of these trials every baseline is tried on as well.
     """
 
     sequences: int = 7
     trials: int = 12
+    baselines: int = 0
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,7 @@ class Task:
         showcase: Whether to gather what pictures need, of the first setup.
         budget: Whether to measure what each stage loses, with the first setup.
         renderers: Processes that draw images on the fly.
+        baselines: Whether to try the baselines on the first setup's maps.
     """
 
     recording: Path | Flight
@@ -64,6 +69,7 @@ class Task:
     showcase: bool = False
     budget: bool = False
     renderers: int = 1
+    baselines: bool = False
 
 
 @dataclass(frozen=True)
@@ -95,10 +101,15 @@ def _measured(recording: Recording, task: Task) -> Outcome:
         _add_trials(out, maps, truth, setup, task)
         if task.budget and setup is task.setups[0]:
             add_error_budget(out, recording, truth, setup, maps, (task.seed, task.flight))
+        if task.baselines and task.protocol.baselines and setup is task.setups[0]:
+            counts = (task.protocol.trials, task.protocol.baselines)
+            seed = (task.seed, task.flight)
+            add_baselines(out, recording, truth, setup.config, maps, seed, counts)
         rows += out.rows
     showcase = None
     if task.showcase:
-        showcase = make_showcase(recording, truth, maps, task.setups[0], task.seed)
+        match = task.baselines and task.protocol.baselines > 0
+        showcase = make_showcase(recording, truth, maps, task.setups[0], task.seed, match)
     return Outcome(rows, showcase)
 
 
@@ -148,8 +159,7 @@ def _add_sequences(out: RowWriter, maps: Maps, truth: Truth, setup: Setup, task:
 
 
 def _add_trials(out: RowWriter, maps: Maps, truth: Truth, setup: Setup, task: Task) -> None:
-    count = min(task.protocol.trials, len(maps.sightings))
-    chosen = np.linspace(0, len(maps.sightings) - 1, count).round().astype(int)
+    chosen = trial_sightings(len(maps.sightings), task.protocol.trials)
     for trial, index in enumerate(chosen):
         rng = np.random.default_rng([task.seed, task.flight, 2, trial])
         result = refine_sighting(maps.sightings[index], truth, setup.config, rng)

@@ -14,6 +14,7 @@ from PIL import Image
 from evaluation import published
 from evaluation.figures.style import save_figure
 from evaluation.headline import headlines
+from evaluation.report_baselines import baseline_table
 from evaluation.report_budget import budget_table
 from evaluation.report_failures import control_table, failure_table
 from evaluation.report_figures import report_figures
@@ -79,6 +80,7 @@ def write_report(
         pictures=pictures,
         trajectories=trajectory_table(table, shown),
         budget=budget_table(measured),
+        baselines=baseline_table(primary),
         timing=timing_table(measured),
         live=live_table(measured),
         by_scene=scene_table(primary),

@@ -98,7 +98,11 @@ def timing_table(table: ResultTable) -> TextTable:
         spread = quantiles(values)
         cells = ("not run", MISSING, MISSING)
         if len(values):
-            cells = (_ms(float(values.mean())), _ms(spread.median), _ms(spread.p95))
+            cells = (
+                milliseconds(float(values.mean())),
+                milliseconds(spread.median),
+                milliseconds(spread.p95),
+            )
         rows.append((f"{stage.group}: {stage.title}", paper, *cells, str(len(values))))
     header = (
         "stage",
@@ -142,7 +146,7 @@ def scene_table(table: ResultTable) -> TextTable:
     return TextTable(header, tuple(rows))
 
 
-def _ms(value: float) -> str:
+def milliseconds(value: float) -> str:
     if not np.isfinite(value):
         return MISSING
     return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:.2f}"

@@ -77,6 +77,7 @@ def reproduce(plan: Plan, recordings: Path | None, workers: int | None = None) -
                         plan.protocol,
                         showcase=not tasks,
                         budget=plan.budget and setups[0] is plan.setups[0],
+                        baselines=setups[0] is plan.setups[0],
                     )
                 )
     workers = workers or usable_cores()

@@ -19,6 +19,7 @@ from airground.core.cloud import PointCloud
 from airground.core.surface import AerialSurface, DepthMap
 from airground.core.trajectory import Trajectory
 from airground.errors import InputError
+from evaluation.baselines.matched_images import MatchedImages
 from evaluation.showcase_files import Archive, read_cloud, write_cloud
 
 
@@ -62,6 +63,7 @@ class Showcase:
         mav_path, ground_path: Cameras of both robots over time, as `T_ground_camera`.
         mav_image: (h, w) or (h, w, 3) uint8, a view of the MAV.
         ground_image: (h, w, 3) uint8, a view of the ground robot.
+        matched: What ASIFT finds between both robots' images; None where not asked for.
     """
 
     scene: str
@@ -81,6 +83,7 @@ class Showcase:
     ground_path: Trajectory
     mav_image: NDArray[np.uint8]
     ground_image: NDArray[np.uint8]
+    matched: MatchedImages | None = None
 
     def __post_init__(self) -> None:
         if len(self.depth_errors) != len(self.depth_maps):
@@ -107,6 +110,7 @@ class Showcase:
             archive.put(name, getattr(self, name))
         for name in ("surface", "aerial_heights", "ground_heights", "mav_path", "ground_path"):
             archive.put(name, getattr(self, name))
+        archive.put("matched", self.matched)
         for name in ("depth_maps", "depth_errors", "steps"):
             archive.put(f"{name}.count", len(getattr(self, name)))
             for i, item in enumerate(getattr(self, name)):
@@ -148,6 +152,7 @@ def _fields(archive: Archive) -> dict[str, Any]:
         "ground_path": archive.get("ground_path", Trajectory),
         "depth_maps": archive.several("depth_maps", DepthMap),
         "steps": archive.several("steps", LocalizationStep),
+        "matched": archive.get("matched", MatchedImages) if archive.has("matched") else None,
     }
     for name in ("surface_error", "aerial_reference", "mav_image", "ground_image"):
         fields[name] = archive.array(name)

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
+from evaluation.baselines.matched_images import MatchedImages
 from evaluation.figures.fig02_views import views_figure
+from evaluation.figures.fig03_matches import DRAWN, matches_figure
 from evaluation.figures.fig05_15_augmented import augmented_figure
 from evaluation.figures.fig06_depth_maps import depth_maps_figure
 from evaluation.figures.fig07_height_maps import height_maps_figure
@@ -36,7 +38,7 @@ class ReportFigure:
 
 
 def showcase_figures(showcase: Showcase) -> Iterator[ReportFigure]:
-    """Fig. 2, 5 and 15, 6, 7 and 8 of one flight."""
+    """Fig. 2, 3, 5 and 15, 6, 7 and 8 of one flight."""
     conditions = f"Scene {showcase.scene}; {showcase.condition}."
     yield ReportFigure(
         "fig02_views",
@@ -44,6 +46,8 @@ def showcase_figures(showcase: Showcase) -> Iterator[ReportFigure]:
         f"Images as the pipeline gets them. {conditions}",
         views_figure(showcase.mav_image, showcase.ground_image),
     )
+    if showcase.matched is not None:
+        yield _matches(showcase.matched, conditions)
     yield ReportFigure(
         "fig05_15_augmented",
         "Fig. 5 and 15: the augmented map",
@@ -75,4 +79,18 @@ def showcase_figures(showcase: Showcase) -> Iterator[ReportFigure]:
         "Green: particles after taking in the map; white: their covariance (2 sigma); cross: "
         "the truth. Behind them the cost of every position. " + conditions,
         particles_figure(showcase.steps),
+    )
+
+
+def _matches(matched: MatchedImages, conditions: str) -> ReportFigure:
+    verdict = "enough" if matched.located else "too few"
+    return ReportFigure(
+        "fig03_matches",
+        "Fig. 3: feature matching between aerial and ground image",
+        "ASIFT with the ratio test. Green: matches that agree on one pose of the MAV's camera, "
+        f"given the ground robot's depth ({verdict} to claim it); red: the others; at most "
+        f"{DRAWN} of each are drawn. Of "
+        f"{matched.views} ground views near the place, the one with most green ones. The paper "
+        f"found matches indoors on planar textured surfaces, and none outdoors. {conditions}",
+        matches_figure(matched),
     )

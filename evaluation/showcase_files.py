@@ -34,6 +34,10 @@ class Archive:
         elif value is not None:
             self.entries[name] = np.asarray(value)
 
+    def has(self, name: str) -> bool:
+        """Whether a dataclass was stored under this name."""
+        return any(entry.startswith(f"{name}.") for entry in self.entries)
+
     def array(self, name: str) -> NDArray:
         return self.entries[name]
 

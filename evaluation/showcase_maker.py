@@ -18,12 +18,13 @@ from airground.io.recording import Recording
 from airground.localization.hypotheses import search_headings, search_positions
 from airground.pipeline import Sighting
 from airground.refinement import refine
+from evaluation.baselines.matched_images import MatchedImages, match_images
 from evaluation.mapping_pass import Maps
 from evaluation.relation import true_T_ground_mav
 from evaluation.setups import Setup
 from evaluation.showcase import LocalizationStep, Showcase
 from evaluation.tracking_quality import Tracked
-from evaluation.trials import SEQUENCE_LENGTH, localize_sequence, sequence_starts
+from evaluation.trials import SEQUENCE_LENGTH, localize_sequence, noisy_start, sequence_starts
 from sim.truth import Truth
 
 PANELS = 3
@@ -31,9 +32,12 @@ PANELS = 3
 
 
 def make_showcase(
-    recording: Recording, truth: Truth, maps: Maps, setup: Setup, seed: int
+    recording: Recording, truth: Truth, maps: Maps, setup: Setup, seed: int, match: bool = False
 ) -> Showcase | None:
-    """The middle of a flight, from depth maps to the augmented map; None if nothing was seen."""
+    """The middle of a flight, from depth maps to the augmented map; None if nothing was seen.
+
+    With `match` also what ASIFT finds between both robots' images, which takes seconds.
+    """
     if not maps.sightings:
         return None
     starts = sequence_starts(len(maps.sightings), 3)
@@ -64,7 +68,18 @@ def make_showcase(
         ground_path=_path(maps.tracked["ground"], SE3.identity()),
         mav_image=recording.mav_image_at(surface.reference_stamp_ns).image,
         ground_image=recording.ground_image_at(shown.ground_stamp_ns).colour,
+        matched=_matched(recording, truth, maps, shown, seed) if match else None,
     )
+
+
+def _matched(
+    recording: Recording, truth: Truth, maps: Maps, sighting: Sighting, seed: int
+) -> MatchedImages | None:
+    """With ground views chosen by a prior as noisy as those of the baselines."""
+    true = true_T_ground_mav(sighting, truth)
+    prior = noisy_start(true, sighting.T_mav_camera, np.random.default_rng([seed, 6]))
+    poses = maps.tracked["ground"].front_end.live_poses()
+    return match_images(recording, poses, sighting, prior)
 
 
 def _localization_steps(

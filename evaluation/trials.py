@@ -59,6 +59,16 @@ def sequence_starts(sightings: int, sequences: int) -> list[int]:
     return sorted({round(start) for start in np.linspace(0, last, sequences)})
 
 
+def trial_sightings(sightings: int, trials: int) -> list[int]:
+    """Which sightings refinement is tried on: spread evenly, each at most once."""
+    return spread_evenly(sightings, min(trials, sightings))
+
+
+def spread_evenly(total: int, count: int) -> list[int]:
+    """`count` of the indices below `total`, the first and the last among them."""
+    return [round(index) for index in np.linspace(0, total - 1, min(count, total))]
+
+
 def localize_sequence(
     sightings: Sequence[Sighting], truth: Truth, config: Config, rng: np.random.Generator
 ) -> Iterator[tuple[Event, float, Iteration | None]]:

@@ -178,7 +178,7 @@ class MonteCarloLocalizer:
         estimate = mean_pose(counted)
         overlay = self._overlay(aerial, ground, estimate[None])
         offset = float(overlay.height_offsets()[0])
-        T_ground_mav = _motion(estimate, position_mav, offset)
+        T_ground_mav = motion_at(estimate, position_mav, offset)
         laid = make_height_map(T_ground_mav @ points_mav, ground.cells_per_m)
         refusal = why_refused(overlay, agreement(laid, ground), particles, self._local)
         return Belief(
@@ -194,7 +194,7 @@ class MonteCarloLocalizer:
         )
 
 
-def _motion(estimate: NDArray, position_mav: NDArray, height_offset: float) -> SE3:
+def motion_at(estimate: NDArray, position_mav: NDArray, height_offset: float) -> SE3:
     """T_ground_mav that brings the camera at `position_mav` to the estimate (x, y, heading)."""
     turned = SE3.from_heading(estimate[2])
     translation = np.array([*estimate[:2], 0.0]) - turned @ position_mav

@@ -15,11 +15,11 @@ if TYPE_CHECKING:
     from evaluation.reproduce import Plan
 
 SCENES = ("indoor_a", "indoor_b", "indoor_c", "flat")
-FLIGHTS, SEQUENCES, TRIALS = 2, 7, 12
+FLIGHTS, SEQUENCES, TRIALS, BASELINES = 2, 7, 12, 12
 """Over three scenes with structure: 42 sequences and 72 trials; the paper has 41 and 67."""
 
 QUICK_SCENES = ("tiny",)
-QUICK_FLIGHTS, QUICK_SEQUENCES, QUICK_TRIALS = 1, 4, 8
+QUICK_FLIGHTS, QUICK_SEQUENCES, QUICK_TRIALS, QUICK_BASELINES = 1, 4, 8, 0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,6 +54,11 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, OutWord):
         None
     )
     """Refinements from a noisy start a flight."""
+    baselines: Annotated[
+        int | None,
+        arg(metavar="N", help_behavior_hint=f"(default: {BASELINES}; with --quick 0)"),
+    ] = None
+    """How many of these every baseline is tried on as well; 0 for none."""
     recordings: Annotated[
         Path | None, arg(metavar="DIR", help_behavior_hint="(default: recordings/ in --out)")
     ] = None
@@ -98,13 +103,14 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, OutWord):
             protocol=Protocol(
                 sequences=self._count("sequences", QUICK_SEQUENCES, SEQUENCES),
                 trials=self._count("trials", QUICK_TRIALS, TRIALS),
+                baselines=self._count("baselines", QUICK_BASELINES, BASELINES, low=0),
             ),
             seed=self.checked_seed(),
             budget=self.budget,
         )
 
-    def _count(self, name: str, quick: int, full: int) -> int:
+    def _count(self, name: str, quick: int, full: int, low: int = 1) -> int:
         asked = getattr(self, name)
         if asked is None:
             return quick if self.quick else full
-        return int(in_range(f"--{name}", asked, low=1))
+        return int(in_range(f"--{name}", asked, low=low))

@@ -8,6 +8,7 @@ import pytest
 
 from airground.core.cloud import PointCloud
 from airground.errors import InputError
+from evaluation.baselines.matched_images import MatchedImages
 from evaluation.scene_pictures import (
     BACKGROUND,
     Viewpoint,
@@ -40,6 +41,14 @@ def _same(one: object, two: object) -> bool:
 def test_a_showcase_is_read_back_as_written(showcase: Showcase, tmp_path: Path) -> None:
     showcase.save(tmp_path)
     assert _same(Showcase.load(tmp_path), showcase)
+
+
+def test_matched_images_are_read_back_as_written(showcase: Showcase, tmp_path: Path) -> None:
+    image = np.arange(12, dtype=np.uint8).reshape(3, 4)
+    pixels = np.array([[0.5, 1.0], [2.0, 1.5]])
+    matched = MatchedImages(image, image, pixels, pixels, np.array([True, False]), 3, False)
+    dataclasses.replace(showcase, matched=matched).save(tmp_path)
+    assert _same(Showcase.load(tmp_path).matched, matched)
 
 
 def test_nothing_is_pickled(showcase: Showcase, tmp_path: Path) -> None:

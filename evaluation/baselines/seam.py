@@ -1,0 +1,115 @@
+"""What a baseline is given and what it answers; the truth is in neither."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.config import Config
+from airground.core.arrays import read_only
+from airground.core.camera import PinholeCamera
+from airground.core.se3 import SE3
+from airground.pipeline import Sighting
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """An image, and the camera that took it.
+
+    Attributes:
+        stamp_ns: Of the image.
+        camera: Its told intrinsics.
+        T_map_camera: Its pose in its robot's own map, by that robot's SLAM.
+        grey: (height, width) uint8.
+        depth: (height, width) float32 [m], NaN for none; None of a camera without depth.
+    """
+
+    stamp_ns: int
+    camera: PinholeCamera
+    T_map_camera: SE3
+    grey: NDArray[np.uint8]
+    depth: NDArray[np.float32] | None = None
+
+    def __post_init__(self) -> None:
+        shape = (self.camera.height, self.camera.width)
+        object.__setattr__(self, "grey", read_only(self.grey, "grey", shape, np.uint8))
+        if self.depth is not None:
+            object.__setattr__(self, "depth", read_only(self.depth, "depth", shape, np.float32))
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """All that a baseline may use to answer one sighting.
+
+    Attributes:
+        sighting: Both maps at one time, and the heading by the magnetometers.
+        config: Resolution, search region and thresholds that ours uses.
+        rng: The one source of randomness.
+        prior: A first guess of T_ground_mav; None unless the baseline declares one.
+        aerial_view: The MAV's reference image of the surface, its pose in `mav`; None unless
+            the baseline declares views.
+        ground_views: Images of the ground robot by then, their poses in `ground`; empty
+            unless the baseline declares views.
+    """
+
+    sighting: Sighting
+    config: Config
+    rng: np.random.Generator
+    prior: SE3 | None = None
+    aerial_view: View | None = None
+    ground_views: tuple[View, ...] = ()
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Where a baseline puts the MAV.
+
+    Attributes:
+        T_ground_mav: Its best guess, None where it has none.
+        refusal: Why it does not claim that guess; empty when it does.
+    """
+
+    T_ground_mav: SE3 | None
+    refusal: str = ""
+
+    def __post_init__(self) -> None:
+        if self.T_ground_mav is None and not self.refusal:
+            raise ValueError("an answer without a pose must say why")
+
+    @property
+    def claimed(self) -> bool:
+        """Whether it says that the MAV is there."""
+        return not self.refusal
+
+
+Prior = Literal["none", "noisy", "truth"]
+"""What first guess a baseline gets: none, the true relation with the trials' noise (0.2 m and
+3 degrees per axis, Sec. VIII-D), or the true relation itself, which makes it an oracle."""
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """One row of the table.
+
+    Attributes:
+        name: Of its metrics; letters, digits and underscores.
+        title: For people.
+        given: What it uses, in words.
+        locate: Answers one sighting; abstains by an answer, never by an exception.
+        prior: The first guess that it gets.
+        views: Whether it gets both robots' images. Which of the ground robot's are near is
+            told by the noisy prior, which spares it a search that ours has to do.
+        module: What it imports beyond the core (the extra `baselines`); empty if nothing.
+    """
+
+    name: str
+    title: str
+    given: str
+    locate: Callable[[Given], Answer]
+    prior: Prior = "none"
+    views: bool = False
+    module: str = ""
