@@ -170,12 +170,8 @@ WATCHED = (
         "sequence",
         samples.localization_error(4),
     ),
-    _success(
-        "within_50cm_1", "within 0.5 m, map 1", "sequence", samples.located(1, 0.50)
-    ),
-    _success(
-        "within_25cm_4", "within 0.25 m, map 4", "sequence", samples.located(4, 0.25)
-    ),
+    _success("within_50cm_1", "within 0.5 m, map 1", "sequence", samples.located(1, 0.50)),
+    _success("within_25cm_4", "within 0.25 m, map 4", "sequence", samples.located(4, 0.25)),
     _success("located", "localizations accepted", "aerial map", samples.claimed),
     _wrong(
         "located_wrongly",
