@@ -162,13 +162,20 @@ WATCHED = (
         "localization_1",
         "localization error, map 1",
         "sequence",
-        samples.localization_error(1),
+        samples.localization("error_m", 1),
     ),
     _error(
         "localization_4",
         "localization error, map 4",
         "sequence",
-        samples.localization_error(4),
+        samples.localization("error_m", 4),
+    ),
+    # How much the first map leaves open (Fig. 12).
+    _error(
+        "spread_1",
+        "particles' spread, map 1",
+        "sequence",
+        samples.localization("spread_m", 1),
     ),
     _success("within_50cm_1", "within 0.5 m, map 1", "sequence", samples.located(1, 0.50)),
     _success("within_25cm_4", "within 0.25 m, map 4", "sequence", samples.located(4, 0.25)),

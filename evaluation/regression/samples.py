@@ -70,11 +70,11 @@ def surfaces_a_flight(table: ResultTable) -> pd.Series:
     return counted.reindex(everyone, fill_value=0)
 
 
-def localization_error(iteration: int) -> Take:
-    """The error after so many aerial maps; NaN where a sequence ended before."""
+def localization(metric: str, iteration: int) -> Take:
+    """A metric after so many aerial maps; NaN where a sequence ended before."""
 
     def take(table: ResultTable) -> pd.Series:
-        wide = table.sequences("error_m")
+        wide = table.sequences(metric)
         if iteration in wide.columns:
             return wide[iteration]
         return pd.Series(np.nan, wide.index)
@@ -84,7 +84,7 @@ def localization_error(iteration: int) -> Take:
 
 def located(iteration: int, limit_m: float) -> Take:
     """1 where the error is within the limit, else 0."""
-    error = localization_error(iteration)
+    error = localization("error_m", iteration)
     return lambda table: (error(table) <= limit_m).astype(float)
 
 
