@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-PERMUTATIONS = 20_000
+PERMUTATIONS = 10_000
 """Tests are exact up to so many rearrangements, and draw as many where there are more."""
 RESAMPLES = 2_000
 SEED = 20_131_103

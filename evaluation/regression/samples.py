@@ -46,8 +46,9 @@ def flights(table: ResultTable) -> list[Flight]:
 def by_flight(table: ResultTable, taken: pd.Series, failure: float) -> Samples:
     """The values of every flight of the table, none for a flight that gave none."""
     made: Samples = {flight: [] for flight in flights(table)}
-    for index, value in taken.sort_index().items():
-        scene, seed, flight, *_ = index
+    ordered = taken.sort_index()
+    levels = [ordered.index.get_level_values(level) for level in range(len(_FLIGHT))]
+    for scene, seed, flight, value in zip(*levels, ordered, strict=True):
         kept = failure if np.isnan(value) else float(f"{value:.{DIGITS}g}")
         made[Flight(str(scene), int(seed), int(flight))].append(kept)
     return made

@@ -15,7 +15,14 @@ HEADER = ("metric", "accepted", "now", "change", "95 % interval", "p", "compared
 NARROW = ("metric", "accepted", "now", "change", "verdict")
 """What fits a terminal of 80 characters; with `WIDE` all of it does."""
 WIDE = 125
-STYLES = {Verdict.WORSE: "bold red", Verdict.BETTER: "bold green", Verdict.UNMEASURED: "dim"}
+STYLES = {
+    Verdict.WORSE: "bold red",
+    Verdict.SLIGHTLY_WORSE: "yellow",
+    Verdict.BETTER: "bold green",
+    Verdict.UNMEASURED: "dim",
+}
+MOVED = (Verdict.WORSE, Verdict.BETTER, Verdict.SLIGHTLY_WORSE, Verdict.SLIGHTLY_BETTER)
+"""In the order in which a reader wants to see them."""
 
 
 def cells(judged: Judged) -> tuple[str, ...]:
@@ -38,7 +45,7 @@ def cells(judged: Judged) -> tuple[str, ...]:
 def conclusion(comparison: Comparison) -> str:
     """One sentence that says what came out."""
     parts = []
-    for verdict in (Verdict.WORSE, Verdict.BETTER):
+    for verdict in MOVED:
         titles = [judged.metric.title for judged in comparison.of(verdict)]
         if titles:
             parts.append(f"{len(titles)} {verdict}: {'; '.join(titles)}")
@@ -50,7 +57,7 @@ def conditions(comparison: Comparison) -> str:
     pairs = "the same flights, trial by trial" if comparison.paired else "other flights"
     text = (
         f"{comparison.suite}; {comparison.condition.label()}; {pairs}. p is adjusted for all "
-        f"metrics (Holm); better or worse: p at most {ALPHA:g} and a change that matters."
+        f"metrics (Holm); better or worse: p at most {ALPHA:g}; slightly: by less than matters."
     )
     if any(_taken_as_independent(judged) for judged in comparison.judged):
         text += (
@@ -84,7 +91,7 @@ def print_comparison(comparison: Comparison, console: Console | None = None) -> 
 
 def markdown(comparison: Comparison) -> str:
     """The table for a pull request: what moved is on top, the rest folds away."""
-    moved = [*comparison.of(Verdict.WORSE), *comparison.of(Verdict.BETTER)]
+    moved = [judged for verdict in MOVED for judged in comparison.of(verdict)]
     rest = [judged for judged in comparison.judged if judged not in moved]
     lines = [f"**airground check: {_escaped(conclusion(comparison))}**", ""]
     if moved:

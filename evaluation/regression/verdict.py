@@ -1,9 +1,10 @@
-"""The verdict on each watched metric: better, worse, or no difference seen.
+"""The verdict on each watched metric: better, worse, moved a little, or no difference seen.
 
 Both sides must be of one suite and one condition. The same flights on both sides are
 paired, and so are their trials one by one; entirely different flights are two samples.
-A verdict needs two things: the change is consistent beyond chance, after Holm's correction
-for all metrics together, and it is at least as large as matters.
+Better or worse needs two things: the change is consistent beyond chance, after Holm's
+correction for all metrics together, and it is at least as large as matters. What is beyond
+chance but smaller has moved; it is shown, and fails nothing.
 """
 
 from __future__ import annotations
@@ -38,6 +39,8 @@ ALPHA = 0.05
 class Verdict(StrEnum):
     BETTER = "better"
     WORSE = "worse"
+    SLIGHTLY_BETTER = "slightly better"
+    SLIGHTLY_WORSE = "slightly worse"
     SAME = "no difference seen"
     UNMEASURED = "not measured"
 
@@ -189,7 +192,9 @@ def _reaches(least_p: float) -> bool:
 
 
 def _verdict(metric: Metric, effect: Effect, p: float, matters: float) -> Verdict:
-    if p > ALPHA or abs(effect.value) < matters or effect.value == 0:
+    if p > ALPHA or effect.value == 0:
         return Verdict.SAME
-    lower = effect.value < 0
-    return Verdict.BETTER if lower == (metric.better == "lower") else Verdict.WORSE
+    improved = (effect.value < 0) == (metric.better == "lower")
+    if abs(effect.value) < matters:
+        return Verdict.SLIGHTLY_BETTER if improved else Verdict.SLIGHTLY_WORSE
+    return Verdict.BETTER if improved else Verdict.WORSE

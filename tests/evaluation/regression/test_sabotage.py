@@ -30,7 +30,7 @@ from tests.localization.synthetic import aerial_points, box_heap, ground_points
 pytestmark = pytest.mark.slow
 
 CONDITION = Condition("best", "synthetic", "nominal", "known")
-FLIGHTS, LENGTH, SEQUENCES = 12, 4, 2
+FLIGHTS, LENGTH, SEQUENCES = 12, 4, 3
 DOWN = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 TINY_CAMERA = PinholeCamera(2, 2, 1.0, 1.0, 0.5, 0.5)
 T_WORLD_MAV = SE3(SE3.from_heading(0.7).rotation, np.array([1.5, -0.4, 0.3]))
@@ -61,7 +61,7 @@ def fly(seed: int) -> Flown:
     """A flight of a few aerial maps along the corridor of a heap."""
     rng = np.random.default_rng([seed, 3])
     heap = box_heap(seed)
-    ground = _cloud(ground_points(heap, rng, frames=24))
+    ground = _cloud(ground_points(heap, rng, frames=60))
     sightings, poses = [], {}
     for stamp in range(LENGTH + SEQUENCES - 1):
         x, y = -1.2 + 0.5 * stamp, rng.uniform(-0.4, 0.4)

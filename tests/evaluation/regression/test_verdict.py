@@ -46,9 +46,12 @@ def test_a_metric_that_got_worse_is_named_and_no_other() -> None:
     assert better(after, before) == ["refined_translation"]
 
 
-def test_a_change_too_small_to_matter_is_no_difference_however_sure() -> None:
+def test_a_change_too_small_to_matter_is_told_but_fails_nothing() -> None:
     before, after = measured(SEEDS), measured(SEEDS, {"after_translation_m": 1.01})
     assert worse(before, after) == []
+    (slight,) = compare(before, after).of(Verdict.SLIGHTLY_WORSE)
+    assert slight.metric.name == "refined_translation"
+    assert len(compare(after, before).of(Verdict.SLIGHTLY_BETTER)) == 1
 
 
 def test_a_change_without_a_direction_is_no_difference() -> None:
