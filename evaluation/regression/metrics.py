@@ -143,7 +143,7 @@ WATCHED = (
     ),
     _error(
         "surface_p90",
-        "surface, 90 % of the error",
+        "surface, 90 % error",
         "surface",
         samples.values("surface", "error_p90_m"),
     ),

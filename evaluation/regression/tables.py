@@ -143,7 +143,7 @@ def _change(metric: Metric, value: float) -> str:
 def _number(metric: Metric, value: float, sign: str) -> str:
     """With three digits or so, in the unit that people say."""
     if metric.unit == "m":
-        return f"{1e3 * value:{sign}.2f} mm"
+        return f"{1e3 * value:{sign}.{2 if abs(value) < 0.1 else 1}f} mm"
     if metric.unit == "deg":
         return f"{value:{sign}.3f}°"
     if metric.unit == "count":
