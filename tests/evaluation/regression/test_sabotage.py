@@ -1,4 +1,4 @@
-"""Sabotage that a check must flag, and one that it cannot yet, on twelve made-up heaps seen by both robots.
+"""Sabotage that a check must flag, and one that it cannot, on twelve made-up heaps.
 
 The clouds are ray-cast with the noise of their sensors; localization, its metrics and the
 verdict are the product's own.
@@ -153,7 +153,7 @@ def freeze_the_particles(patch: pytest.MonkeyPatch) -> None:
             drop_the_overlap_rule,
             marks=pytest.mark.xfail(
                 strict=True,
-                reason="spoils one first map in ten: twelve flights are too few to tell",
+                reason="spoils one first map in ten: too few in twelve flights",
             ),
         ),
     ],
