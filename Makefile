@@ -3,7 +3,7 @@ PYTHON_IN_VENV := .venv/bin/python
 READY := .venv/.ready
 OUT ?= results/demo
 
-.PHONY: demo setup test test-slow check format clean
+.PHONY: demo setup test test-slow check regression format clean
 
 demo: $(READY)
 	rm -rf $(OUT)
@@ -26,6 +26,12 @@ check: $(READY)
 	$(PYTHON_IN_VENV) -m ruff check .
 	$(PYTHON_IN_VENV) -m ruff format --check .
 	$(PYTHON_IN_VENV) -m mypy
+
+# Did a change make it worse? Against evaluation/accepted.json; docs/check_a_change.md.
+regression: $(READY)
+	rm -rf results/regression
+	.venv/bin/airground reproduce --suite fast --out results/regression
+	.venv/bin/airground check results/regression
 
 format: $(READY)
 	$(PYTHON_IN_VENV) -m ruff format .

@@ -36,14 +36,16 @@ class Protocol:
     """How much is measured on each recording.
 
     Attributes:
-        sequences: Sequences of 12 aerial maps, spread evenly over the flight.
+        sequences: Sequences of aerial maps, spread evenly over the flight.
         trials: Refinements from a noisy start, likewise.
         baselines: How many of these trials every baseline is tried on as well.
+        sequence_length: Aerial maps in a sequence.
     """
 
     sequences: int = 7
     trials: int = 12
     baselines: int = 0
+    sequence_length: int = SEQUENCE_LENGTH
 
 
 @dataclass(frozen=True)
@@ -144,17 +146,18 @@ def _add_surfaces(out: RowWriter, maps: Maps, truth: Truth) -> None:
 
 
 def _add_sequences(out: RowWriter, maps: Maps, truth: Truth, setup: Setup, task: Task) -> None:
-    starts = sequence_starts(len(maps.sightings), task.protocol.sequences)
+    length = task.protocol.sequence_length
+    starts = sequence_starts(len(maps.sightings), task.protocol.sequences, length)
     for sequence, start in enumerate(starts):
         rng = np.random.default_rng([task.seed, task.flight, 1, sequence])
-        sightings = maps.sightings[start : start + SEQUENCE_LENGTH]
+        sightings = maps.sightings[start : start + length]
         iteration = 0
         for event, duration_ms, result in localize_sequence(sightings, truth, setup.config, rng):
             out.add("timing", STAGE_OF[type(event)], duration_ms, "ms")
             if result is not None:
                 iteration += 1
                 out.add_belief(result.belief, result.error, sequence, iteration)
-        for missing in range(iteration + 1, SEQUENCE_LENGTH + 1):
+        for missing in range(iteration + 1, length + 1):
             out.add_no_belief("the flight gave no further aerial map", sequence, missing)
 
 

@@ -67,6 +67,17 @@ def read_results(folder: Path) -> Results:
     )
 
 
+def read_table(folder: Path) -> ResultTable:
+    """Read only the measurements of what `Results.write` wrote.
+
+    Raises:
+        InputError: The folder or its table is missing or damaged; names it.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder; expected what run or reproduce wrote")
+    return ResultTable.read(folder / TABLE)
+
+
 def merged(parts: Sequence[Results]) -> Results:
     """Several results as one; the first gives the primary condition and the pictures."""
     first = parts[0]

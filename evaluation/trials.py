@@ -50,12 +50,12 @@ class RefinementTrial:
     duration_ms: float
 
 
-def sequence_starts(sightings: int, sequences: int) -> list[int]:
+def sequence_starts(sightings: int, sequences: int, length: int = SEQUENCE_LENGTH) -> list[int]:
     """Where sequences begin: spread evenly over a flight, chosen by nothing else.
 
-    A flight with fewer than 12 aerial maps gives one sequence; what it lacks counts as failed.
+    A flight with fewer aerial maps than a sequence has gives one; what it lacks counts as failed.
     """
-    last = max(0, sightings - SEQUENCE_LENGTH)
+    last = max(0, sightings - length)
     return sorted({round(start) for start in np.linspace(0, last, sequences)})
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import arg
 
@@ -12,7 +12,9 @@ from airground.errors import InputError
 from evaluation.commands.words import OutWord, SeedWord, SensorWord, SetupWords, Verb, in_range
 
 if TYPE_CHECKING:
-    from evaluation.reproduce import Plan
+    from collections.abc import Callable
+
+    from evaluation.reproduce import Findings, Plan
 
 SCENES = ("indoor_a", "indoor_b", "indoor_c", "flat")
 FLIGHTS, SEQUENCES, TRIALS, BASELINES = 2, 7, 12, 12
@@ -30,6 +32,10 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, OutWord):
     that the report compares it with, and writes results.parquet, summary.json, report.html.
     """
 
+    suite: Annotated[
+        Literal["fast"] | None, arg(metavar="{fast}", help_behavior_hint="(optional)")
+    ] = None
+    """Instead, a fixed small suite that check is meant for: only the setup asked for."""
     quick: bool = False
     """One small scene and a short flight: minutes instead of hours."""
     alone: bool = False
@@ -69,17 +75,35 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, OutWord):
 
     def main(self) -> None:
         from evaluation.output import fresh_folder
-        from evaluation.reproduce import reproduce
         from evaluation.results_folder import Results
         from evaluation.screen import print_summary
 
-        plan = self.plan()
+        measure = self._protocol() if self.suite is None else self._suite(self.suite)
+        setup, seed = self.setup(), self.checked_seed()
         with fresh_folder(self.out) as folder:
-            recordings = None if self.render else self.recordings or folder / "recordings"
-            findings = reproduce(plan, recordings, self.workers())
-            results = Results(findings.table, plan.setups[0].config, plan.seed, findings.showcase)
-            summary = results.write(folder)
+            findings = measure(self.recordings or folder / "recordings")
+            summary = Results(findings.table, setup.config, seed, findings.showcase).write(folder)
         print_summary(summary)
+
+    def _protocol(self) -> Callable[[Path], Findings]:
+        from evaluation.reproduce import reproduce
+
+        plan = self.plan()
+        return lambda recordings: reproduce(
+            plan, None if self.render else recordings, self.workers()
+        )
+
+    def _suite(self, name: str) -> Callable[[Path], Findings]:
+        from evaluation.regression.suite import SUITES, run_suite
+
+        fixed = ("quick", "budget", "render", "scenes", "flights", "sequences", "trials")
+        for word in (*fixed, "baselines"):
+            if getattr(self, word):
+                raise InputError(f"--{word}: the suite {name} is fixed; give --{word} without it")
+        setup, seed = self.setup(), self.checked_seed()
+        return lambda recordings: run_suite(
+            SUITES[name], setup, self.sensors, seed, recordings, self.workers()
+        )
 
     def plan(self) -> Plan:
         """What the words ask for, checked."""
