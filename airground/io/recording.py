@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Collection, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
@@ -35,6 +37,7 @@ from airground.io.plausibility import (
     check_up_in_body,
     upwards,
 )
+from airground.io.read_ahead import read_ahead
 from airground.io.tum import read_associations
 
 NOTHING: Mapping[Source, Collection[int]] = MappingProxyType({})
@@ -158,12 +161,15 @@ class Recording:
         Raises:
             RecordingError: An image cannot be read or does not fit the calibration.
         """
-        streams = (
-            bundles(source, self._images(source, dropped.get(source, ())), *self.samples(source))
-            for source in (Source.GROUND, Source.MAV)
-        )
-        for _, bundle in heapq.merge(*streams, key=lambda stamped_bundle: stamped_bundle[0]):
-            yield from bundle
+        with ThreadPoolExecutor(1) as pool:
+            streams = (
+                bundles(
+                    robot, self._images(robot, dropped.get(robot, ()), pool), *self.samples(robot)
+                )
+                for robot in (Source.GROUND, Source.MAV)
+            )
+            for _, bundle in heapq.merge(*streams, key=lambda stamped_bundle: stamped_bundle[0]):
+                yield from bundle
 
     def calibration(self, robot: Source) -> RobotCalibration:
         """What the pipeline is told about a robot's sensors."""
@@ -185,10 +191,12 @@ class Recording:
             return self.read_mav_image(index)
         return self.read_ground_image(index)
 
-    def _images(self, robot: Source, dropped: Collection[int]) -> Iterator[MavImage | GroundImage]:
-        for index, stamp in enumerate(self.stamps_ns(robot).tolist()):
-            if stamp not in dropped:
-                yield self.read_image(robot, index)
+    def _images(
+        self, robot: Source, dropped: Collection[int], pool: ThreadPoolExecutor
+    ) -> Iterator[MavImage | GroundImage]:
+        stamps = self.stamps_ns(robot).tolist()
+        kept = [index for index, stamp in enumerate(stamps) if stamp not in dropped]
+        return read_ahead(pool, partial(self.read_image, robot), kept)
 
     def mav_images(self) -> Iterator[MavImage]:
         for index in range(len(self.mav_camera_stamps)):
