@@ -49,6 +49,8 @@ def prepare(threads: int | None = None) -> int:
         if threads is not None:
             os.environ[name] = str(count)
         os.environ.setdefault(name, str(count))
+    # Threads that wait for each other sleep: spinning, they take cores from whoever has work.
+    os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     # OpenMP first: an outdated TBB, which numba would prefer, makes it complain on every run.
     os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp tbb workqueue")
     backend = "egl" if _loads("libEGL.so.1") else "osmesa"
