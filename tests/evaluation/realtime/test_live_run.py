@@ -121,15 +121,15 @@ class Running:
         text = Path(f"/proc/{pid}/task/{pid}/children").read_text()
         named = {}
         for child in map(int, text.split()):
-            command = Path(f"/proc/{child}/cmdline").read_bytes()
-            if b"spawn_main" in command:
-                named[f"{child}"] = child
+            with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # gone meanwhile
+                if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes():
+                    named[f"{child}"] = child
         return named
 
     def is_connected(self, pid: int) -> bool:
         links = []
         for fd in os.listdir(f"/proc/{pid}/fd"):
-            with contextlib.suppress(FileNotFoundError):  # closed meanwhile
+            with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # closed meanwhile
                 links.append(os.readlink(f"/proc/{pid}/fd/{fd}"))
         return "anon_inode:[eventpoll]" in links
 
