@@ -14,9 +14,10 @@ from typing import Annotated, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from airground.errors import InputError
+from evaluation.checked_json import read_checked
 from evaluation.published import TABLE_I
 from evaluation.realtime.live_summary import LiveSummary, live_summary
 from evaluation.results import Condition, ResultTable
@@ -173,14 +174,7 @@ class Summary(_Part):
         Raises:
             InputError: The file is missing, no JSON, or breaks the contract.
         """
-        try:
-            return cls.model_validate_json(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-        except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(map(str, first["loc"])) or "the file"
-            raise InputError(f"{path}: {where}: {first['msg']}") from error
+        return read_checked(cls, path, "summary")
 
 
 def build_summary(table: ResultTable, condition: Condition, run: RunInfo) -> Summary:

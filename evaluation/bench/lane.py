@@ -6,10 +6,13 @@ import importlib.util
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from airground.config import Config
 from airground.io.recording import Recording
+from airground.warm_up import warm_up
 from evaluation.bench.curves import CURVES_BY_NAME, CurvePoint
-from evaluation.bench.material import Material, Played, compile_stages, play
+from evaluation.bench.material import Material, Played, play
 from evaluation.bench.memory import peak_memory_mib
 from evaluation.bench.probe import probe
 from evaluation.bench.row import Contender, Floor, Speed, Work
@@ -115,7 +118,7 @@ def open_lane(path: Path, whole: bool) -> tuple[Lane, Opened]:
     """
     speed = probe()
     recording, config = Recording.open(path), Config()
-    compile_stages(config)
+    warm_up(config, np.random.default_rng(0))
     kept: list[tuple[Material, Played]] = []
     peak = peak_memory_mib(lambda: kept.append(play(recording, config, whole)))
     material, played = kept[0]

@@ -33,7 +33,6 @@ from airground.io.recording import Recording
 from airground.pipeline import Pipeline, Sighting, sight
 from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
 from airground.tracking import FrontEnds, Trackers
-from airground.warm_up import warm_up
 from evaluation.watched_front_end import WatchedFrontEnd
 
 ALIGNED_SURFACES = 3
@@ -106,11 +105,6 @@ class Played:
     recorded_s: float
     processing_s: float
     cpu_s: float
-
-
-def compile_stages(config: Config) -> None:
-    """Compile what the pipeline needs, so that it is in nobody's time or memory."""
-    warm_up(config, np.random.default_rng(0))
 
 
 def play(recording: Recording, config: Config, whole: bool) -> tuple[Material, Played]:

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
-from airground.errors import InputError
 from evaluation.bench.load import LoadAverage
 from evaluation.bench.sampler import Turn
+from evaluation.checked_json import read_checked
 
 SCHEMA: Literal[1] = 1
 
@@ -202,11 +202,4 @@ class BenchReport(Part):
         Raises:
             InputError: It is none, or of another version.
         """
-        try:
-            return cls.model_validate_json(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"{path}: cannot be read: {error}") from None
-        except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(map(str, first["loc"])) or "file"
-            raise InputError(f"{path}: no benchmark: {where}: {first['msg']}") from None
+        return read_checked(cls, path, "benchmark")

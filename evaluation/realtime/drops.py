@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from airground.core.cloud import Source
 from airground.core.messages import MavImage
@@ -17,6 +17,7 @@ from airground.errors import InputError
 from airground.io.recording import Recording
 from airground.link.frame_codec import as_received
 from airground.tracking import TrackedFrame, without
+from evaluation.checked_json import read_checked
 
 SCHEMA: Literal[1] = 1
 
@@ -58,14 +59,7 @@ class DropList(_Part):
         Raises:
             InputError: The file is missing, no such list, or of another recording.
         """
-        try:
-            made = cls.model_validate_json(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-        except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(map(str, first["loc"])) or "the file"
-            raise InputError(f"{path}: {where}: {first['msg']}") from error
+        made = read_checked(cls, path, "list of drops")
         if made.recording != fingerprint(recording):
             raise InputError(
                 f"{path}: was made with another recording than {recording.path}; "

@@ -13,9 +13,10 @@ from datetime import date
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from airground.errors import InputError
+from evaluation.checked_json import read_checked
 from evaluation.regression.measured import Measured, headline
 from evaluation.regression.metrics import WATCHED
 from evaluation.regression.samples import DIGITS, Flight, Samples
@@ -148,14 +149,7 @@ class Accepted(_Part):
         Raises:
             InputError: The file is missing, no JSON, or of another schema.
         """
-        try:
-            return cls.model_validate_json(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"{path}: no accepted figures can be read ({error})") from error
-        except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(map(str, first["loc"])) or "the file"
-            raise InputError(f"{path}: {where}: {first['msg']}") from error
+        return read_checked(cls, path, "accepted figures")
 
 
 def _numbers(values: list[float] | None) -> list[float | None] | None:
