@@ -78,10 +78,10 @@ class ViewSelection(Section):
     """Depth maps within this distance of the first are fused [m]."""
     both_sides: bool = True
     """Also use the views before the reference, so that what one side hides the other sees."""
-    max_views: Annotated[int, Field(ge=1, le=40)] = 16
+    max_views: Annotated[int, Field(ge=1, le=40)] = 8
     """At most this many views a depth map: a view joins when it is far enough from the
     others for this many to spread over the radius."""
-    min_views: Count = 5
+    min_views: Count = 4
     """Fewer views than this make no depth map."""
     min_baseline_m: Positive = 0.06
     """Nor do views that all lie closer than this, across the line of sight [m]."""
@@ -94,7 +94,7 @@ class ViewSelection(Section):
 class PlaneSweep(Section):
     """Depth maps from many close views (Sec. V)."""
 
-    hypotheses: Count = 200
+    hypotheses: Count = 128
     """Depth planes, evenly spaced in inverse depth."""
     window_px: Count = 3
     """Side of the window over which the photometric error is averaged [px, half resolution]."""
@@ -251,8 +251,8 @@ def paper() -> Config:
     return Config(
         preset="paper",
         monocular_slam=MonocularSlam(scale="filter"),
-        view_selection=ViewSelection(both_sides=False),
-        plane_sweep=PlaneSweep(window_px=5, smoothing="none"),
+        view_selection=ViewSelection(both_sides=False, max_views=16, min_views=5),
+        plane_sweep=PlaneSweep(hypotheses=200, window_px=5, smoothing="none"),
         fusion=Fusion(min_observations=1),
         height_maps=HeightMaps(cells_per_m=50.0),
         localization=Localization(

@@ -100,7 +100,7 @@ def _window_sum(source: NDArray, out: NDArray, radius: int) -> None:
             out[x] += shifted[x]
 
 
-@njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
 def box_mean(
     first: NDArray,
     first_limits: NDArray,

@@ -64,7 +64,7 @@ def _speckles(plane: NDArray[np.float32]) -> NDArray[np.bool_]:
     return (cleaned == -16) & (scaled != -16)
 
 
-@njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
 def pick(costs: NDArray, mean: NDArray, plane: NDArray, sigma: NDArray) -> None:
     """The winning plane of each pixel, its sub-plane position and how sure it is.
 

@@ -83,7 +83,7 @@ class FieldHistogram:
         self.depth_maps += 1
 
 
-@njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
 def add_field(
     counts: NDArray,
     depth: NDArray,

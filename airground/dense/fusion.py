@@ -17,6 +17,8 @@ from airground.dense.distance_field import MAX_BINS
 FAST = {"contract", "reassoc", "arcp", "nsz"}
 STEP = 12.0**-0.5
 """Primal and dual step; the squared norm of the 3-d gradient is at most 12."""
+BLOCK_ROWS = 16
+"""Rows that one thread takes at a time; fixed, so that the number of threads changes nothing."""
 UNSEEN = -1.0
 """Where no depth map sees anything, phi starts behind the surface."""
 
@@ -44,12 +46,11 @@ class Fusion:
         phi, ahead, dy, dk, dx = self._memory
         start(counts, self.spacing, phi, ahead, dy, dk, dx)
         for _ in range(self.iterations):
-            dual_step(ahead, dy, dk, dx, STEP)
-            primal_step(counts, self.spacing, phi, ahead, dy, dk, dx, STEP, STEP * self.data_weight)
+            iterate(counts, self.spacing, phi, ahead, dy, dk, dx, STEP, STEP * self.data_weight)
         return phi
 
 
-@njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
 def start(
     counts: NDArray,
     spacing: float,
@@ -81,36 +82,8 @@ def start(
             dx[y, k, :] = np.float32(0)
 
 
-@njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
-def dual_step(ahead: NDArray, dy: NDArray, dk: NDArray, dx: NDArray, step: float) -> None:
-    """p <- project(p + sigma grad phi_ahead) onto the unit ball."""
-    rows, planes, columns = ahead.shape
-    one, sigma = np.float32(1), np.float32(step)
-    for y in prange(rows):
-        below = min(np.int64(y) + 1, rows - 1)
-        for k in range(planes):
-            behind = k + 1 if k + 1 < planes else k
-            here, down, deep = ahead[y, k], ahead[below, k], ahead[y, behind]
-            a, b, c = dy[y, k], dk[y, k], dx[y, k]
-            right = here[1:]
-            for x in range(columns - 1):
-                u = a[x] + sigma * (down[x] - here[x])
-                v = b[x] + sigma * (deep[x] - here[x])
-                w = c[x] + sigma * (right[x] - here[x])
-                shrink = one / max(one, np.sqrt(u * u + v * v + w * w))
-                a[x] = u * shrink
-                b[x] = v * shrink
-                c[x] = w * shrink
-            x = columns - 1
-            u = a[x] + sigma * (down[x] - here[x])
-            v = b[x] + sigma * (deep[x] - here[x])
-            shrink = one / max(one, np.sqrt(u * u + v * v))
-            a[x] = u * shrink
-            b[x] = v * shrink
-
-
-@njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
-def primal_step(
+@njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
+def iterate(
     counts: NDArray,
     spacing: float,
     phi: NDArray,
@@ -121,31 +94,105 @@ def primal_step(
     step: float,
     weight: float,
 ) -> None:
-    """phi <- prox(phi + tau div p), and the extrapolation 2 phi_new - phi_old.
+    """One step of the dual and one of the primal, in one pass through memory.
+
+    A line's primal step needs the dual of the lines before it, and its dual the not yet
+    changed lines behind it, so that both can be done line by line. Blocks of rows are
+    independent once the dual of each block's last row is there: the block behind needs it.
+    """
+    rows, planes, columns = phi.shape
+    zero = np.zeros(columns, np.float32)
+    sigma, data_weight, width = np.float32(step), np.float32(weight), np.float32(spacing)
+    blocks = (rows + BLOCK_ROWS - 1) // BLOCK_ROWS
+    for block in prange(blocks):
+        y = min((np.int64(block) + 1) * BLOCK_ROWS, rows) - 1
+        below = min(y + 1, rows - 1)
+        for k in range(planes):
+            deep = ahead[y, min(k + 1, planes - 1)]
+            dual_step(ahead[y, k], ahead[below, k], deep, dy[y, k], dk[y, k], dx[y, k], sigma)
+    for block in prange(blocks):
+        moved = np.empty(columns, np.float32)
+        first = np.int64(block) * BLOCK_ROWS
+        last = min(first + BLOCK_ROWS, rows) - 1
+        for y in range(first, last + 1):
+            for k in range(planes):
+                here, a, b, c = ahead[y, k], dy[y, k], dk[y, k], dx[y, k]
+                if y < last:
+                    dual_step(
+                        here, ahead[y + 1, k], ahead[y, min(k + 1, planes - 1)], a, b, c, sigma
+                    )
+                a_before = dy[y - 1, k] if y > 0 else zero
+                b_before = dk[y, k - 1] if k > 0 else zero
+                descend(phi[y, k], a, b, c, a_before, b_before, sigma, moved)
+                primal_step(moved, counts[y, k], phi[y, k], here, data_weight, width)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def dual_step(
+    here: NDArray,
+    down: NDArray,
+    deep: NDArray,
+    a: NDArray,
+    b: NDArray,
+    c: NDArray,
+    sigma: np.float32,
+) -> None:
+    """p <- project(p + sigma grad phi_ahead) onto the unit ball, along a line."""
+    one = np.float32(1)
+    last = len(here) - 1
+    right = here[1:]
+    for x in range(last):
+        u = a[x] + sigma * (down[x] - here[x])
+        v = b[x] + sigma * (deep[x] - here[x])
+        w = c[x] + sigma * (right[x] - here[x])
+        shrink = one / max(one, np.sqrt(u * u + v * v + w * w))
+        a[x] = u * shrink
+        b[x] = v * shrink
+        c[x] = w * shrink
+    u = a[last] + sigma * (down[last] - here[last])
+    v = b[last] + sigma * (deep[last] - here[last])
+    shrink = one / max(one, np.sqrt(u * u + v * v))
+    a[last] = u * shrink
+    b[last] = v * shrink
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def descend(
+    phi: NDArray,
+    a: NDArray,
+    b: NDArray,
+    c: NDArray,
+    a_before: NDArray,
+    b_before: NDArray,
+    tau: np.float32,
+    moved: NDArray,
+) -> None:
+    """phi + tau div p along a line, written to `moved`."""
+    moved[0] = phi[0] + tau * (a[0] - a_before[0] + b[0] - b_before[0] + c[0])
+    for x in range(1, len(phi)):
+        moved[x] = phi[x] + tau * (a[x] - a_before[x] + b[x] - b_before[x] + c[x] - c[x - 1])
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def primal_step(
+    moved: NDArray,
+    word: NDArray,
+    phi: NDArray,
+    ahead: NDArray,
+    data_weight: np.float32,
+    width: np.float32,
+) -> None:
+    """phi <- prox(moved) along a line, and the extrapolation 2 phi_new - phi_old.
 
     The prox of tau lambda sum_j n_j |phi - c_j| at v is
     max over k = 0..8 of min(v + tau lambda W_k, c_{k+1}) with W_0 = N, W_k = W_{k-1} - 2 n_k
     and c_9 = inf: the k-th term is the solution if it lies between c_k and c_{k+1}. With
     fewer than eight bins the rest stay empty and add no kink.
     """
-    rows, planes, columns = phi.shape
-    zero = np.zeros(columns, np.float32)
-    tau, data_weight, width = np.float32(step), np.float32(weight), np.float32(spacing)
-    for y in prange(rows):
-        shifted = np.empty(columns, np.float32)
-        for k in range(planes):
-            a, b, c = dy[y, k], dk[y, k], dx[y, k]
-            a_before = dy[np.int64(y) - 1, k] if y > 0 else zero
-            b_before = dk[y, k - 1] if k > 0 else zero
-            old, extrapolated, word = phi[y, k], ahead[y, k], counts[y, k]
-            shifted[0] = old[0] + tau * (a[0] - a_before[0] + b[0] - b_before[0] + c[0])
-            for x in range(1, columns):
-                divergence = a[x] - a_before[x] + b[x] - b_before[x] + c[x] - c[x - 1]
-                shifted[x] = old[x] + tau * divergence
-            for x in range(columns):
-                value = prox(shifted[x], np.uint32(word[x]), data_weight, width)
-                extrapolated[x] = value + value - old[x]
-                old[x] = value
+    for x in range(len(phi)):
+        value = prox(moved[x], np.uint32(word[x]), data_weight, width)
+        ahead[x] = value + value - phi[x]
+        phi[x] = value
 
 
 @njit(cache=True, inline="always")

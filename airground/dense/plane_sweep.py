@@ -21,6 +21,8 @@ from airground.core.se3 import SE3
 from airground.dense import sweep_kernels as kernels
 from airground.dense.workspace import Workspace
 
+ROUNDING_PX = 1e-6
+"""A pixel this far outside of an image is on its edge [px]."""
 GAIN_BLUR_PX = 21
 """Brightness is compared over squares of this side [px] ..."""
 GAIN_STRIDE_PX = 6
@@ -82,17 +84,11 @@ class TurnedView:
         turned = cv2.warpPerspective(
             image.astype(np.float32), homography, size, flags=flags, borderMode=cv2.BORDER_REPLICATE
         )
-        inside = cv2.warpPerspective(
-            np.full(image.shape, 255, np.uint8),
-            homography,
-            size,
-            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-        )
         height, width = camera.height // 2, camera.width // 2
         mean = cv2.boxFilter(turned, -1, (2, 2), anchor=(0, 0), borderType=cv2.BORDER_REPLICATE)
         blocks = mean[: 2 * height, : 2 * width].reshape(height, 2, width, 2)
         phases = np.ascontiguousarray(blocks.transpose(1, 0, 3, 2), np.float32)
-        return cls(phases, _row_limits(inside == 255)[: 2 * height])
+        return cls(phases, _covered_columns(homography, camera)[: 2 * height])
 
     def scaled(self, gain: Gain) -> TurnedView:
         """The view as bright as the reference."""
@@ -101,14 +97,28 @@ class TurnedView:
         return TurnedView(self.phases * factor.astype(np.float32)[None, :, None, :], self.valid)
 
 
-def _row_limits(inside: NDArray[np.bool_]) -> NDArray[np.int32]:
-    """(rows, 2) columns [lo, hi) where the 2 x 2 mean that starts there is all inside."""
-    whole = np.zeros_like(inside)
-    whole[:-1, :-1] = inside[:-1, :-1] & inside[1:, :-1] & inside[:-1, 1:] & inside[1:, 1:]
-    lo = whole.argmax(axis=1)
-    hi = whole.shape[1] - whole[:, ::-1].argmax(axis=1)
-    hi[~whole.any(axis=1)] = 0
-    return np.stack([lo, hi], axis=1).astype(np.int32)
+def _covered_columns(homography: NDArray, camera: PinholeCamera) -> NDArray[np.int32]:
+    """(rows, 2) columns [lo, hi) where the 2 x 2 mean that starts there saw the image only.
+
+    Pixel (x, y) falls on (q_x / q_z, q_y / q_z) with q linear in both: that this is a place in
+    the image are inequalities that each give one end of the row.
+    """
+    to_x, to_y, to_z = homography
+    inside = np.stack(
+        [to_x, (camera.width - 1) * to_z - to_x, to_y, (camera.height - 1) * to_z - to_y, to_z]
+    )
+    slope = inside[:, :1]
+    at_column_0 = inside[:, 1:2] * np.arange(camera.height) + inside[:, 2:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        end = -at_column_0 / slope
+    never = ((slope == 0) & (at_column_0 < 0)).any(axis=0)
+    first = np.ceil(np.where(slope > 0, end, 0.0).max(axis=0) - ROUNDING_PX)
+    last = np.floor(np.where(slope < 0, end, camera.width - 1.0).min(axis=0) + ROUNDING_PX)
+    last[never] = -1
+    lo = np.append(np.maximum(first[:-1], first[1:]), 0).clip(0)
+    hi = np.append(np.minimum(last[:-1], last[1:]), 0)
+    hi[hi <= lo] = 0
+    return np.stack([np.where(hi > 0, lo, 0), hi], axis=1).astype(np.int32)
 
 
 class CostVolume:
@@ -157,6 +167,7 @@ class PlaneSweep:
         self.depths = depths
         self.parameters = parameters
         self.reference = halved(image)
+        self._coarse = _coarse(self.reference)
         shape = (self.camera.height, len(depths), self.camera.width)
         self.workspace = workspace or Workspace()
         self.volumes = [CostVolume(self.workspace.take(shape)) for _ in range(sides)]
@@ -223,10 +234,9 @@ class PlaneSweep:
         flags = cv2.INTER_NEAREST | cv2.WARP_INVERSE_MAP
         even = np.ascontiguousarray(view.phases[0, :, 0, :])
         moved = cv2.warpAffine(even, matrix, size, flags=flags, borderValue=-1e6)
-        coarse = np.s_[GAIN_BLUR_PX // 2 :: GAIN_STRIDE_PX, GAIN_BLUR_PX // 2 :: GAIN_STRIDE_PX]
-        blurred = cv2.blur(moved, (GAIN_BLUR_PX, GAIN_BLUR_PX))[coarse].ravel()
-        target = cv2.blur(self.reference, (GAIN_BLUR_PX, GAIN_BLUR_PX))[coarse].ravel()
-        rows, columns = (axis[coarse].ravel() for axis in np.mgrid[: size[1], : size[0]])
+        blurred, target = _coarse(moved).ravel(), self._coarse.ravel()
+        begin, stride = GAIN_BLUR_PX // 2, GAIN_STRIDE_PX
+        rows, columns = np.indices(self._coarse.shape).reshape(2, -1) * stride + begin
         terms = np.column_stack([np.ones(len(rows)), columns, rows]) * blurred[:, None]
         good = blurred > 1
         gain = np.array([1.0, 0.0, 0.0])
@@ -237,3 +247,9 @@ class PlaneSweep:
             off = np.abs(terms @ gain - target)
             good &= off <= 2.5 * np.median(off[good]) + 0.5
         return Gain(*gain)
+
+
+def _coarse(image: NDArray) -> NDArray:
+    """Means over squares of the image, a few pixels apart."""
+    begin, stride = GAIN_BLUR_PX // 2, GAIN_STRIDE_PX
+    return cv2.blur(image, (GAIN_BLUR_PX, GAIN_BLUR_PX))[begin::stride, begin::stride]

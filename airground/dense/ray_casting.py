@@ -136,7 +136,7 @@ def _line_zero(column: NDArray, k: int, reach: int, crossing: float) -> float:
     return zero if abs(zero - crossing) <= 1.5 else crossing
 
 
-@njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
 def scan(
     phi: NDArray,
     counts: NDArray,

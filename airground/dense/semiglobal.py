@@ -72,7 +72,7 @@ def _jump(step: int, jump: float, edge: float, here: float, before: float) -> in
     return max(int(jump / (1.0 + abs(here - before) / edge)), step)
 
 
-@njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
 def along_rows(
     mean: NDArray, image: NDArray, step: int, jump: float, edge: float, total: NDArray
 ) -> None:
@@ -98,7 +98,7 @@ def along_rows(
                 )
 
 
-@njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
 def along_columns(
     mean: NDArray, image: NDArray, step: int, jump: float, edge: float, total: NDArray
 ) -> None:

@@ -49,7 +49,7 @@ def plan_columns(scale: NDArray, shift: NDArray, width: int) -> tuple[NDArray, N
     return starts, offsets, fractions
 
 
-@njit(cache=True, parallel=True, error_model="numpy", fastmath=FAST)
+@njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
 def add_view(
     costs: NDArray,
     first_view: bool,

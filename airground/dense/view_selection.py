@@ -121,7 +121,7 @@ def view_spacing(parameters: Parameters) -> float:
     """Least distance between the views of a depth map [m].
 
     At 0.5 m/s and 30 Hz frames are 17 mm apart: with 16 views over 12 cm on each side every
-    frame is taken.
+    frame is taken, with 8 every other one.
     """
     sides = 2 if parameters.both_sides else 1
     return sides * parameters.depth_map_radius_m / (parameters.max_views + 1)

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from airground.errors import RecordingError
+from airground.io.png import SIGNATURE, PngHeader, decode_png, warm_up_decoding
 
-_PNG_START = b"\x89PNG\r\n\x1a\n"
 _PNG_END = b"IEND\xaeB`\x82"
 
 
@@ -21,8 +22,7 @@ def read_grey(path: Path, width: int, height: int) -> NDArray[np.uint8]:
 
 def read_colour(path: Path, width: int, height: int) -> NDArray[np.uint8]:
     """(height, width, 3) uint8 RGB; raises RecordingError naming the file."""
-    bgr = _read(path, (height, width, 3), np.uint8)
-    return np.asarray(cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB), np.uint8)
+    return _read(path, (height, width, 3), np.uint8)
 
 
 def read_depth(path: Path, width: int, height: int, units_per_m: float) -> NDArray[np.float32]:
@@ -32,17 +32,31 @@ def read_depth(path: Path, width: int, height: int, units_per_m: float) -> NDArr
 
 def metric_depth(units: NDArray[np.uint16], units_per_m: float) -> NDArray[np.float32]:
     """Depth [m] from the values of a depth image; NaN for 0."""
-    depth = units.astype(np.float32) / np.float32(units_per_m)
-    depth[units == 0] = np.nan
+    depth = np.empty(units.shape, np.float32)
+    _to_metres(np.ascontiguousarray(units).reshape(-1), np.float32(units_per_m), depth.reshape(-1))
     return depth
+
+
+def warm_up_images() -> None:
+    """Compile what reading images needs."""
+    warm_up_decoding()
+    metric_depth(np.zeros((1, 1), np.uint16), 1.0)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _to_metres(units: NDArray, units_per_m: np.float32, depth: NDArray) -> None:
+    for i in range(len(units)):
+        depth[i] = np.float32(units[i]) / units_per_m if units[i] > 0 else np.float32(np.nan)
 
 
 def image_size(path: Path) -> tuple[int, int]:
     """Width and height [px], from the file's first bytes; raises RecordingError."""
     data = _bytes(path)
-    if len(data) < 24:
-        raise RecordingError(f"{path}: is truncated: the PNG image has no size")
-    return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
+    try:
+        header = PngHeader.read(data)
+    except ValueError as error:
+        raise RecordingError(f"{path}: is truncated: {error}") from None
+    return header.width, header.height
 
 
 def _bytes(path: Path) -> bytes:
@@ -51,7 +65,7 @@ def _bytes(path: Path) -> bytes:
         data = path.read_bytes()
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None
-    if not data.startswith(_PNG_START):
+    if not data.startswith(SIGNATURE):
         raise RecordingError(f"{path}: is no PNG image")
     return data
 
@@ -60,14 +74,17 @@ def _read(path: Path, shape: tuple[int, ...], dtype: type[np.generic]) -> NDArra
     data = _bytes(path)
     if not data.endswith(_PNG_END):
         raise RecordingError(f"{path}: is truncated: the PNG image has no end")
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    if image is None:
-        raise RecordingError(f"{path}: is damaged: the PNG image cannot be decoded")
-    if image.shape[:2] != shape[:2]:
-        raise RecordingError(
-            f"{path}: is {image.shape[1]}x{image.shape[0]}, "
-            f"the calibration says {shape[1]}x{shape[0]}"
-        )
+    try:
+        header = PngHeader.read(data)
+        # Before anything is allocated for it.
+        if (header.height, header.width) != shape[:2]:
+            raise RecordingError(
+                f"{path}: is {header.width}x{header.height}, "
+                f"the calibration says {shape[1]}x{shape[0]}"
+            )
+        image = decode_png(data) if header.pixel_bytes else _decode_any(data)
+    except ValueError as error:
+        raise RecordingError(f"{path}: cannot be decoded: {error}") from None
     if image.ndim != len(shape) or image.dtype != dtype:
         channels = 1 if image.ndim == 2 else image.shape[2]
         raise RecordingError(
@@ -75,3 +92,11 @@ def _read(path: Path, shape: tuple[int, ...], dtype: type[np.generic]) -> NDArra
             f"expected {1 if len(shape) == 2 else shape[2]} of {np.dtype(dtype)}"
         )
     return image
+
+
+def _decode_any(data: bytes) -> NDArray:
+    """The image in a PNG file of any kind; ValueError if it is damaged."""
+    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    if image is None:
+        raise ValueError("the PNG image is damaged")
+    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB) if image.ndim == 3 else image

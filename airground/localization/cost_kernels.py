@@ -56,7 +56,7 @@ def one_minus_correlation(
     return costs
 
 
-@njit(cache=True, error_model="numpy", fastmath=KEEPS_NAN)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=KEEPS_NAN)
 def sums_at_positions(
     aerial: NDArray[np.float32],
     aerial_mask: NDArray[np.float32],
@@ -145,7 +145,7 @@ def _add_row(
     sums[5] += sum_ag
 
 
-@njit(cache=True, parallel=True, error_model="numpy", fastmath=KEEPS_NAN)
+@njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=KEEPS_NAN)
 def sums_at_poses(
     cells: NDArray[np.float32], ground: NDArray[np.float32], poses: NDArray[np.float64]
 ) -> NDArray[np.float64]:

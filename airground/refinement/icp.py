@@ -85,7 +85,7 @@ def _solve(moved: NDArray, points: NDArray, normals: NDArray) -> SE3:
     return SE3(turn.rotation, centre + delta[3:] - turn.rotation @ centre)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _normal_equations(moved: NDArray, points: NDArray, normals: NDArray) -> tuple[NDArray, NDArray]:
     """Sums over J^T J (6, 6) and -J^T r (6,) with J = [p x n, n] and r = n . (p - q)."""
     matrix = np.zeros((6, 6))

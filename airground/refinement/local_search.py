@@ -61,7 +61,7 @@ def _best_shift(
     return float(costs[ix, iy]), np.array([ix, iy]) - reach, float(heights[ix, iy])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _shift_costs(
     aerial: NDArray, ground: NDArray, first: NDArray, reach: int
 ) -> tuple[NDArray, NDArray, NDArray]:

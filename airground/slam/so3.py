@@ -14,7 +14,7 @@ SMALL_ANGLE_SQUARED = 1e-8
 """Below this, three terms of the series are exact and the closed forms lose digits [rad^2]."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def hat(v: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3, 3) skew matrix with `hat(v) @ x = cross(v, x)`."""
     m = np.zeros((3, 3))
@@ -23,7 +23,7 @@ def hat(v: NDArray[np.float64]) -> NDArray[np.float64]:
     return m
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _combined(v: NDArray, constant: float, linear: float, squared: float) -> NDArray:
     """`constant * I + linear * hat(v) + squared * hat(v) @ hat(v)`."""
     x, y, z = v[0], v[1], v[2]
@@ -40,7 +40,7 @@ def _combined(v: NDArray, constant: float, linear: float, squared: float) -> NDA
     return m
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def exp(v: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3, 3) rotation by the vector `v` [rad]."""
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
@@ -51,7 +51,7 @@ def exp(v: NDArray[np.float64]) -> NDArray[np.float64]:
     return _combined(v, 1.0, np.sin(angle) / angle, 2.0 * half * half / square)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def log(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3,) rotation vector [rad] of a (3, 3) rotation; its length is at most pi."""
     r = rotation
@@ -81,7 +81,7 @@ def log(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
     return vector * (2.0 * np.arctan2(sine, q[0]) / sine)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def right_jacobian(v: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3, 3) J with `exp(v + d) = exp(v) @ exp(J @ d)` to first order in d."""
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
@@ -93,7 +93,7 @@ def right_jacobian(v: NDArray[np.float64]) -> NDArray[np.float64]:
     return _combined(v, 1.0, -2.0 * half * half / square, cubic)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def right_jacobian_inverse(v: NDArray[np.float64]) -> NDArray[np.float64]:
     """(3, 3) J with `log(exp(v) @ exp(d)) = v + J @ d` to first order; |v| below 2 pi."""
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from airground.config import Config
+from airground.config import Config, paper
 from airground.core.camera import PinholeCamera
 from airground.core.surface import DepthMap
 from airground.dense.depth_refinement import depth_from_costs
@@ -19,6 +19,7 @@ from airground.dense.ray_casting import cast_surface, surface_cloud
 from airground.dense.scene_extent import scene_extent
 from airground.dense.view_selection import AFTER, BEFORE, PosedImage
 from airground.dense.volume import Volume
+from airground.dense.workspace import Workspace
 from airground.errors import InputError
 from evaluation.bench import floors
 from evaluation.bench.material import Material
@@ -40,6 +41,7 @@ class Sweep:
     reference: PosedImage
     views: list[PosedImage]
     config: Config
+    _workspace: Workspace = field(default_factory=Workspace)
     _sweep: PlaneSweep | None = None
     _added: int = 0
     _planes: NDArray[np.float64] = field(init=False)
@@ -72,6 +74,8 @@ class Sweep:
     def ready(self) -> None:
         """Begin anew when all views are in."""
         if self._sweep is None or self._added == len(self.views):
+            if self._sweep is not None:
+                self._sweep.release()
             self._sweep = PlaneSweep(
                 self.reference.image,
                 self.camera,
@@ -79,6 +83,7 @@ class Sweep:
                 self._planes,
                 self.config.plane_sweep,
                 self.sides,
+                self._workspace,
             )
             self._added = 0
 
@@ -105,14 +110,20 @@ def sweep_of(material: Material, config: Config) -> Sweep:
     return Sweep(material.mav_camera, material.reference, material.views, config)
 
 
+def with_paper_planes(config: Config) -> Config:
+    """The same pipeline with as many depth planes as Table I was measured with."""
+    planes = {"hypotheses": paper().plane_sweep.hypotheses}
+    return config.model_copy(update={"plane_sweep": config.plane_sweep.model_copy(update=planes)})
+
+
 def add_frame(material: Material) -> Work:
-    sweep = sweep_of(material, material.config)
+    sweep = sweep_of(material, with_paper_planes(material.config))
     floor = floors.add_frame(sweep.pixels, sweep.config.plane_sweep.hypotheses)
     return Work(sweep.add_next, sweep.ready, sweep.size, floor)
 
 
 def depth_map(material: Material) -> Work:
-    sweep = sweep_of(material, material.config)
+    sweep = sweep_of(material, with_paper_planes(material.config))
     parameters = sweep.config.plane_sweep
     finished = sweep.complete()
     floor = floors.depth_map(

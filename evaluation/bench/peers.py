@@ -17,6 +17,7 @@ from airground.core.surface import DepthMap
 from airground.dense.plane_sweep import halved, inverse_depth_planes
 from airground.dense.scene_extent import scene_extent
 from airground.dense.volume import Volume
+from evaluation.bench.dense_rows import with_paper_planes
 from evaluation.bench.localization_rows import Maps, paper_sized
 from evaluation.bench.map_rows import start_of
 from evaluation.bench.material import Material
@@ -64,7 +65,7 @@ def _filled(heights: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[
 
 def plane_by_plane(material: Material) -> Work:
     """OpenCV: warp the view by each plane's homography, difference, truncate, add."""
-    config = material.config.plane_sweep
+    config = with_paper_planes(material.config).plane_sweep
     camera = material.mav_camera
     small = camera.halved()
     reference, view = material.reference, material.views[-1]

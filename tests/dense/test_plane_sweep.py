@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from airground.config import PlaneSweep as Parameters
 from airground.core.camera import PinholeCamera
@@ -190,3 +192,28 @@ def test_used_memory_leaves_no_trace(smoothing: str) -> None:
     np.testing.assert_array_equal(first, depth_map(Workspace()))
     np.testing.assert_array_equal(first, depth_map(used))
     assert np.isfinite(first).any()
+
+
+@pytest.mark.parametrize(
+    "turn_deg", [(0, 0, 0), (3, 0, 0), (0, -4, 0), (0, 0, 12), (2, 5, -20), (50, 0, 3)]
+)
+def test_a_view_covers_the_columns_that_opencv_fills(turn_deg: tuple[float, float, float]) -> None:
+    """Warping an image that is white all over shows which pixels were seen."""
+    rotation = Rotation.from_euler("xyz", turn_deg, degrees=True).as_matrix()
+    white = np.full((CAMERA.height, CAMERA.width), 255, np.uint8)
+    matrix = CAMERA.matrix()
+    seen = (
+        cv2.warpPerspective(
+            white,
+            matrix @ rotation @ np.linalg.inv(matrix),
+            (CAMERA.width, CAMERA.height),
+            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+        )
+        == 255
+    )
+    means = seen[:-1, :-1] & seen[1:, :-1] & seen[:-1, 1:] & seen[1:, 1:]
+    valid = TurnedView.turn(white, CAMERA, rotation).valid
+    columns = np.arange(CAMERA.width - 1)
+    filled = (columns >= valid[:-1, :1]) & (columns < valid[:-1, 1:])
+    # OpenCV rounds places to 1/32 px, so that a few pixels along the edge differ.
+    assert (filled[: len(means)] != means).mean() < 0.01

@@ -12,7 +12,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def eliminate_chain(
     chain: NDArray,
     links: NDArray,
@@ -69,13 +69,13 @@ def eliminate_chain(
     return spread, offset
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _columns(k: int, count: int) -> tuple[int, int]:
     """Where the poses k - 1 to k + 1 stand."""
     return max(0, 6 * k - 6), min(6 * count, 6 * k + 12)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def place(slot: int, moving: int, n: int) -> int:
     """Where number n of a keyframe's 15 stands among the unknowns."""
     return 6 * slot + n if n < 6 else 6 * moving + 9 * slot + n - 6

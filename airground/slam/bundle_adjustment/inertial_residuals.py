@@ -87,7 +87,7 @@ def _stack(rows: Sequence[ArrayLike], *shape: int) -> NDArray[np.float64]:
     return np.array(rows, np.float64).reshape(len(rows), *shape)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def motion_residual(
     first: NDArray,
     second: NDArray,
@@ -139,7 +139,7 @@ def motion_residual(
     return residual
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def linearize_motions(
     firsts: NDArray,
     durations: NDArray,
@@ -184,7 +184,7 @@ def linearize_motions(
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def add_motions(
     firsts: NDArray,
     slots: NDArray,

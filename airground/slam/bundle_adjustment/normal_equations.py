@@ -217,7 +217,7 @@ class Model:
         return Estimate(rotations, vectors, points)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _move_keyframes(
     slots: NDArray,
     moving: int,

@@ -45,7 +45,7 @@ def prior_sharpness(
     return sharpness
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def linearize_priors(
     sharpness: NDArray,
     start_rotations: NDArray,
@@ -87,7 +87,7 @@ def linearize_priors(
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def add_priors(
     sharpness: NDArray,
     slots: NDArray,

@@ -25,7 +25,7 @@ NUMBERS = 12
 FASTMATH = {"contract", "reassoc", "arcp", "nsz"}
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def huber(square: float, threshold: float) -> tuple[float, float]:
     """Cost and weight of a whitened residual of this squared norm."""
     if square <= threshold * threshold:
@@ -34,7 +34,7 @@ def huber(square: float, threshold: float) -> tuple[float, float]:
     return threshold * (norm - 0.5 * threshold), threshold / norm
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def camera_poses(
     rotations: NDArray, positions: NDArray, R_rig_camera: NDArray, t_rig_camera: NDArray
 ) -> tuple[NDArray, NDArray]:
@@ -48,7 +48,7 @@ def camera_poses(
     return turned, centres
 
 
-@njit(cache=True, error_model="numpy", fastmath=FASTMATH)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def _into_camera(turn: NDArray, point: NDArray, centre: NDArray) -> tuple[float, float, float]:
     """A point of the map in a camera that stands at `centre`."""
     x, y, z = point[0] - centre[0], point[1] - centre[1], point[2] - centre[2]
@@ -59,7 +59,7 @@ def _into_camera(turn: NDArray, point: NDArray, centre: NDArray) -> tuple[float,
     )
 
 
-@njit(cache=True, error_model="numpy", fastmath=FASTMATH)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def _row(scale: float, along: NDArray, tangent: float, axis: NDArray) -> tuple[float, float, float]:
     """One row of A: how a pixel coordinate follows the point."""
     return (
@@ -69,7 +69,7 @@ def _row(scale: float, along: NDArray, tangent: float, axis: NDArray) -> tuple[f
     )
 
 
-@njit(cache=True, error_model="numpy", fastmath=FASTMATH)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def _store(row: NDArray, a: tuple, b: tuple, c: tuple, error: tuple, w: float, q: float) -> None:
     """A'WA and A'Wr, A of the rows a and b of weight w and c of weight q, r weighted."""
     row[0] = w * (a[0] * a[0] + b[0] * b[0]) + q * c[0] * c[0]
@@ -83,7 +83,7 @@ def _store(row: NDArray, a: tuple, b: tuple, c: tuple, error: tuple, w: float, q
     row[8] = a[2] * error[0] + b[2] * error[1] + c[2] * error[2]
 
 
-@njit(cache=True, error_model="numpy", fastmath=FASTMATH)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def linearize(
     keyframes: NDArray,
     points_seen: NDArray,
@@ -143,7 +143,7 @@ def linearize(
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def reprojection_errors_px(
     keyframes: NDArray,
     points_seen: NDArray,

@@ -16,7 +16,7 @@ FLOOR = 1e-10
 are all but parallel, leave the depth open, and to any other point this is as good as nothing."""
 
 
-@njit(cache=True, error_model="numpy", fastmath=FASTMATH)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def _point_block(
     linear: NDArray, start: int, stop: int, damping: float
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
@@ -55,14 +55,14 @@ def _point_block(
     )
 
 
-@njit(cache=True, error_model="numpy", fastmath=FASTMATH)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def _cross(
     a0: float, a1: float, a2: float, b0: float, b1: float, b2: float
 ) -> tuple[float, float, float]:
     return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
 
 
-@njit(cache=True, error_model="numpy", fastmath=FASTMATH)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def _times_symmetric(
     v0: float, v1: float, v2: float, row: NDArray | tuple
 ) -> tuple[float, float, float]:
@@ -74,7 +74,7 @@ def _times_symmetric(
     )
 
 
-@njit(cache=True, error_model="numpy", fastmath=FASTMATH)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def _add_block(hessian: NDArray, r: int, c: int, m: tuple, d: tuple, e: tuple) -> None:
     """Add G_d' M G_e, with G_d = [hat(d), -I], at row r and column c."""
     m00, m01, m02, m10, m11, m12, m20, m21, m22 = m
@@ -98,7 +98,7 @@ def _add_block(hessian: NDArray, r: int, c: int, m: tuple, d: tuple, e: tuple) -
     _add_row(rows[5], -p20, -p21, -p22, m20, m21, m22)
 
 
-@njit(cache=True, error_model="numpy", fastmath=FASTMATH)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def _add_row(
     row: NDArray, v0: float, v1: float, v2: float, v3: float, v4: float, v5: float
 ) -> None:
@@ -110,7 +110,7 @@ def _add_row(
     row[5] += v5
 
 
-@njit(cache=True, error_model="numpy", fastmath=FASTMATH)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def _add_diagonal(diagonal: NDArray, s: int, row: NDArray) -> None:
     """The diagonal of G' B G before any point is eliminated: what damping scales with."""
     d0, d1, d2 = row[9], row[10], row[11]
@@ -122,7 +122,7 @@ def _add_diagonal(diagonal: NDArray, s: int, row: NDArray) -> None:
     diagonal[s + 5] += row[5]
 
 
-@njit(cache=True, error_model="numpy", fastmath=FASTMATH)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def eliminate_points(
     linear: NDArray,
     starts: NDArray,
@@ -183,7 +183,7 @@ def eliminate_points(
                 _add_block(hessian, s, 6 * slots[b], block, d, (other[9], other[10], other[11]))
 
 
-@njit(cache=True, error_model="numpy", fastmath=FASTMATH)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def move_points(
     linear: NDArray,
     starts: NDArray,

@@ -52,7 +52,7 @@ def sort_observations(
     return SortedObservations(keyframes, points, slots, measured, starts)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _order(
     keyframes: NDArray, points: NDArray, slot_of: NDArray, point_count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -62,7 +62,7 @@ def _order(
     return _counting_sort(points, point_count, by_slot)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _counting_sort(
     keys: NDArray, key_count: int, order: NDArray
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

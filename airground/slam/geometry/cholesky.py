@@ -7,7 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def solve(H: NDArray, g: NDArray) -> tuple[NDArray, bool]:
     """x with H x = g by Cholesky, and whether H is positive definite."""
     n = len(g)
@@ -35,7 +35,7 @@ def solve(H: NDArray, g: NDArray) -> tuple[NDArray, bool]:
     return x, True
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def inverse(H: NDArray) -> NDArray:
     """Inverse of a positive definite matrix; NaN if it is not."""
     result = np.full(H.shape, np.nan)

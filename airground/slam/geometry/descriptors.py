@@ -72,7 +72,7 @@ def describe(image: NDArray[np.uint8], pixels: NDArray) -> Described:
     return Described(pixels, descriptors)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _directions(image: NDArray, pixels: NDArray) -> NDArray:
     """(n,) angle [rad] in [0, 2 pi) from a disc's centre to its centroid of intensity."""
     height, width = image.shape
@@ -92,7 +92,7 @@ def _directions(image: NDArray, pixels: NDArray) -> NDArray:
     return angles
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def hamming(a: NDArray, b: NDArray) -> int:
     """Number of different bits of two (4,) uint64 descriptors."""
     total = np.uint64(0)
@@ -106,7 +106,7 @@ def hamming(a: NDArray, b: NDArray) -> int:
     return int(total)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def match(
     query: NDArray[np.uint64], known: NDArray[np.uint64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -145,7 +145,7 @@ def match(
     return rows[:kept], partners[:kept]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def votes(
     query: NDArray[np.uint64], known: NDArray[np.uint64], starts: NDArray[np.int64]
 ) -> NDArray[np.int64]:

@@ -23,13 +23,13 @@ MAX_CHI2 = 3.84
 """95 % of the squares of one normal variable are below."""
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def essential(R: NDArray, t: NDArray) -> NDArray:
     """E with ray_a^T E ray_b = 0 for T_a_b = (R, t)."""
     return so3.hat(t) @ R
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def sampson(E: NDArray, ua: float, va: float, ub: float, vb: float) -> float:
     """Signed first-order distance of two rays from meeting, in units of u and v."""
     lx = E[0, 0] * ub + E[0, 1] * vb + E[0, 2]
@@ -41,7 +41,7 @@ def sampson(E: NDArray, ua: float, va: float, ub: float, vb: float) -> float:
     return (ua * lx + va * ly + lz) / norm
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def direction_by_two_rays(
     rays_a: NDArray,
     rays_b: NDArray,
@@ -91,7 +91,7 @@ def direction_by_two_rays(
     return best
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def refine(
     rays_a: NDArray,
     rays_b: NDArray,
@@ -123,7 +123,7 @@ def refine(
     return R, t, inliers, inverse(H)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _choose(rays_a: NDArray, rays_b: NDArray, R: NDArray, t: NDArray, sigma: float) -> NDArray:
     """Which pairs of rays meet within 1.96 sigma."""
     E = essential(R, t)
@@ -134,7 +134,7 @@ def _choose(rays_a: NDArray, rays_b: NDArray, R: NDArray, t: NDArray, sigma: flo
     return inliers
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _descend(
     rays_a: NDArray,
     rays_b: NDArray,
@@ -171,7 +171,7 @@ def _descend(
     return R, t
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _normal_equations(
     rays_a: NDArray,
     rays_b: NDArray,
@@ -213,7 +213,7 @@ def _normal_equations(
     return H, g, cost
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _moved(R: NDArray, t: NDArray, delta: NDArray) -> tuple[NDArray, NDArray]:
     """(R, t) turned: t by two angles across itself, R by a rotation vector on the left."""
     smallest = np.argmin(np.abs(t))

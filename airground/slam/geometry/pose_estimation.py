@@ -111,7 +111,7 @@ def estimate_pose(
     return PoseFit(pose, inliers, rms_px, covariance, iterations)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _fit(
     observed: NDArray, k: NDArray, R0: NDArray, p0: NDArray, prior: NDArray, huber: float
 ) -> tuple[NDArray, NDArray, NDArray, float, NDArray, int]:
@@ -131,7 +131,7 @@ def _fit(
     return R, p, use_pixel, np.sqrt(square / count), covariance, steps + more
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _descend(
     observed: NDArray,
     k: NDArray,
@@ -171,7 +171,7 @@ def _descend(
     return R, p, iterations
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _normal_equations(
     observed: NDArray,
     k: NDArray,
@@ -230,7 +230,7 @@ def _normal_equations(
     return H, g, cost
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _huber_cost(square: float, huber: float) -> float:
     """Squared up to `huber`, linear beyond."""
     if square <= huber * huber:
@@ -238,7 +238,7 @@ def _huber_cost(square: float, huber: float) -> float:
     return 2.0 * huber * np.sqrt(square) - huber * huber
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _row(
     row: NDArray, R: NDArray, d0: float, d1: float, d2: float, a: float, b: float, c: float
 ) -> None:
@@ -255,7 +255,7 @@ def _row(
     row[5] = n0 * d1 - n1 * d0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _add(H: NDArray, g: NDArray, row: NDArray, residual: float, weight: float) -> None:
     """Add one weighted residual to the upper triangle of H and to g."""
     for j in range(6):
@@ -265,7 +265,7 @@ def _add(H: NDArray, g: NDArray, row: NDArray, residual: float, weight: float) -
             H[j, m] += scaled * row[m]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _classify(
     observed: NDArray, k: NDArray, R: NDArray, p: NDArray, use_pixel: NDArray, use_depth: NDArray
 ) -> float:

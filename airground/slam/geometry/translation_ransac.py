@@ -54,7 +54,7 @@ def translation_by_known_rotation(
     return SE3(nearest_rotation(R_map_camera), R_map_camera @ centre), inliers
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _consensus(
     points: NDArray, rays: NDArray, first: NDArray, second: NDArray, threshold: float
 ) -> tuple[NDArray, NDArray]:
@@ -83,7 +83,7 @@ def _consensus(
     return best, inliers
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _square(points: NDArray, rays: NDArray, i: int, centre: NDArray) -> float:
     """Squared distance of a ray from its point's projection; infinite behind the camera."""
     z = points[i, 2] - centre[2]
@@ -94,7 +94,7 @@ def _square(points: NDArray, rays: NDArray, i: int, centre: NDArray) -> float:
     return u * u + v * v
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _two_points(points: NDArray, rays: NDArray, i: int, j: int) -> NDArray:
     """The position c with c_xy - ray * c_z = point_xy - ray * point_z, least squares of four."""
     ui, vi, uj, vj = rays[i, 0], rays[i, 1], rays[j, 0], rays[j, 1]
@@ -109,7 +109,7 @@ def _two_points(points: NDArray, rays: NDArray, i: int, j: int) -> NDArray:
     return centre
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _least_squares(points: NDArray, rays: NDArray, inliers: NDArray, z: float) -> NDArray:
     """The same over all inliers; weights 1 / depth^2 turn metres into the image's errors."""
     total, su, sv, sa, sb = 0.0, 0.0, 0.0, 0.0, 0.0

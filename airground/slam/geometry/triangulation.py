@@ -82,7 +82,7 @@ def _each(poses: Poses, n: int) -> tuple[NDArray[np.float64], NDArray[np.float64
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _triangulate(
     R_a: NDArray,
     t_a: NDArray,
@@ -119,7 +119,7 @@ def _triangulate(
     return points, depth, sigma, parallax, error, good
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _linear_inverse_depth(
     R: NDArray, t: NDArray, u: float, v: float, ub: float, vb: float
 ) -> float:
@@ -131,7 +131,7 @@ def _linear_inverse_depth(
     return (cu * (ub * z - x) + cv * (vb * z - y)) / (cu * cu + cv * cv)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _angle(R: NDArray, u: float, v: float, ub: float, vb: float) -> float:
     """Angle between the ray (u, v, 1) of view a and (ub, vb, 1) of view b [rad]."""
     x = R[0, 0] * u + R[0, 1] * v + R[0, 2]
@@ -141,7 +141,7 @@ def _angle(R: NDArray, u: float, v: float, ub: float, vb: float) -> float:
     return np.arctan2(np.sqrt(cx * cx + cy * cy + cz * cz), x * ub + y * vb + z)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _gauss_newton(
     R: NDArray, t: NDArray, x: NDArray, pixel_a: NDArray, pixel_b: NDArray, k: NDArray
 ) -> tuple[NDArray, float, float]:

@@ -56,7 +56,7 @@ class Chain(NamedTuple):
     sigmas: NDArray[np.float64]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _scatter(
     jacobian: NDArray, residual: NDArray, first: int, band: NDArray, border: NDArray, top: NDArray
 ) -> None:
@@ -85,7 +85,7 @@ def _scatter(
         top[i, SHARED] += gradient[n + i]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _inertial(
     chain: Chain, k: int, first: tuple, second: tuple, gravity: NDArray, tilts: NDArray
 ) -> tuple[NDArray, NDArray]:
@@ -136,7 +136,7 @@ def _inertial(
     return residual, jacobian
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _visual(chain: Chain, k: int, R: NDArray, p: NDArray, unit: float) -> tuple[NDArray, NDArray]:
     """(6,) white residual of a visual pose, (6, 18) Jacobian; `unit` is 1 / scale."""
     turn = log(chain.rotations[k].T @ R)
@@ -152,7 +152,7 @@ def _visual(chain: Chain, k: int, R: NDArray, p: NDArray, unit: float) -> tuple[
     return residual, jacobian
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _prior(chain: Chain, v: NDArray, gyro: NDArray, force: NDArray) -> tuple[NDArray, NDArray]:
     """(9,) white residual of velocity and biases where a chain begins, (9, 18) Jacobian."""
     residual = np.empty(9)
@@ -165,7 +165,7 @@ def _prior(chain: Chain, v: NDArray, gyro: NDArray, force: NDArray) -> tuple[NDA
     return residual, jacobian
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def normal_equations(
     chain: Chain,
     rotations: NDArray[np.float64],

@@ -16,7 +16,7 @@ from airground.slam.so3 import exp, right_jacobian
 Sums = tuple[NDArray, NDArray, NDArray, NDArray, NDArray, float]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _interpolated(
     stamps: NDArray[np.int64], readings: NDArray, stamp: int, after: int
 ) -> NDArray[np.float64]:
@@ -30,7 +30,7 @@ def _interpolated(
     return (1.0 - share) * readings[before] + share * readings[after]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _product(a: NDArray, b: NDArray, out: NDArray) -> None:
     """out = a @ b for (3, 3) and (3, n); BLAS takes longer to call than this to run."""
     for i in range(3):
@@ -38,7 +38,7 @@ def _product(a: NDArray, b: NDArray, out: NDArray) -> None:
             out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _turned_force(rotation: NDArray, force: NDArray, out: NDArray) -> None:
     """out = rotation @ hat(force): how the turned force changes with the rotation, negated."""
     x, y, z = force[0], force[1], force[2]
@@ -48,7 +48,7 @@ def _turned_force(rotation: NDArray, force: NDArray, out: NDArray) -> None:
         out[i, 2] = rotation[i, 0] * y - rotation[i, 1] * x
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _propagate(
     covariance: NDArray, turn: NDArray, lever: NDArray, dt: float, rows: NDArray, lean: NDArray
 ) -> None:
@@ -72,7 +72,7 @@ def _propagate(
                 covariance[i, j], covariance[j, i] = covariance[j, i], covariance[i, j]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _add_noise(
     covariance: NDArray, jacobian: NDArray, tilt: NDArray, dt: float, gyro: float, force: float
 ) -> None:
@@ -101,7 +101,7 @@ def _add_noise(
             covariance[6 + i, 6 + j] += 0.25 * dt**4 * white
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _mean_force(
     rotation: NDArray,
     turned: NDArray,
@@ -138,7 +138,7 @@ def _mean_force(
             force[i] += 0.5 * (rotation[i, j] * reading[3 + j] + turned[i, j] * following[3 + j])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _add_step(
     velocity: NDArray,
     position: NDArray,
@@ -176,7 +176,7 @@ def _add_step(
             jacobians[2, i, j] += dt * by_force
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def preintegrate(
     stamps: NDArray[np.int64],
     readings: NDArray[np.float64],
@@ -250,7 +250,7 @@ def preintegrate(
     return rotation, velocity, position, jacobians, covariance, _gap(stamps, start, end)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy")
 def _gap(stamps: NDArray[np.int64], start: int, end: int) -> float:
     """The longest time between neighbouring samples that any of [start, end] lies in [s]."""
     first = max(int(np.searchsorted(stamps, start, side="right")) - 1, 0)

@@ -1,0 +1,143 @@
+"""Decoding the PNG images that recordings hold, more than twice as fast as libpng does.
+
+Half of what libpng takes for a camera's image goes into inflating it, which Intel's ISA-L
+does faster; what remains is to undo the filters of the rows. Only the kinds of PNG that a
+recording uses are decoded here: grey of 8 or 16 bits and RGB of 8, not interlaced.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+from isal import isal_zlib
+from numba import njit
+from numpy.typing import NDArray
+
+SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_GREY, _RGB = 0, 2
+_KINDS = {(_GREY, 8): 1, (_GREY, 16): 2, (_RGB, 8): 3}
+"""Bytes a pixel by colour type and bits."""
+
+
+@dataclass(frozen=True)
+class PngHeader:
+    """What the file says of itself.
+
+    Attributes:
+        width, height: Of the image [px].
+        pixel_bytes: Bytes a pixel; None for a kind of PNG that is not decoded here.
+    """
+
+    width: int
+    height: int
+    pixel_bytes: int | None
+
+    @classmethod
+    def read(cls, data: bytes) -> PngHeader:
+        """From a file's first bytes; ValueError where they are no header."""
+        if len(data) < 33 or not data.startswith(SIGNATURE) or data[12:16] != b"IHDR":
+            raise ValueError("the PNG image has no header")
+        width, height, bits, colour, *methods = struct.unpack(">IIBBBBB", data[16:29])
+        return cls(width, height, None if any(methods) else _KINDS.get((colour, bits)))
+
+    @property
+    def row_bytes(self) -> int:
+        """Bytes a row without its filter's number."""
+        assert self.pixel_bytes is not None
+        return self.width * self.pixel_bytes
+
+
+def decode_png(data: bytes) -> NDArray:
+    """The image in a PNG file.
+
+    Returns:
+        (height, width) uint8 or uint16, or (height, width, 3) uint8 RGB.
+
+    Raises:
+        ValueError: The file is damaged, or of a kind that is not decoded here.
+    """
+    header = PngHeader.read(data)
+    if header.pixel_bytes is None:
+        raise ValueError("this kind of PNG image is not decoded here")
+    size = header.height * (1 + header.row_bytes)
+    # Never more than the header promises, whatever a small file would expand to.
+    inflater = isal_zlib.decompressobj()
+    try:
+        raw = inflater.decompress(_image_data(data), size + 1)
+    except isal_zlib.error as error:  # type: ignore[misc]  # its stub calls it an instance
+        raise ValueError(f"the PNG image is damaged: {error}") from error
+    if len(raw) != size or not inflater.eof:
+        raise ValueError("the PNG image is damaged: its data end at the wrong place")
+    filtered = np.frombuffer(raw, np.uint8).reshape(header.height, 1 + header.row_bytes)
+    rows = np.empty((header.height, header.row_bytes), np.uint8)
+    if not undo_filters(filtered, rows, header.pixel_bytes):
+        raise ValueError("the PNG image is damaged: it has a filter of no known kind")
+    if header.pixel_bytes == 2:
+        return rows.view(">u2").astype(np.uint16)
+    return rows if header.pixel_bytes == 1 else rows.reshape(header.height, header.width, 3)
+
+
+def warm_up_decoding() -> None:
+    """Compile what decoding needs."""
+    undo_filters(np.zeros((1, 2), np.uint8), np.empty((1, 1), np.uint8), 1)
+
+
+def _image_data(data: bytes) -> bytes:
+    """All of the image's compressed bytes, from as many chunks as there are."""
+    chunks = []
+    at = len(SIGNATURE)
+    while at + 8 <= len(data):
+        length = int.from_bytes(data[at : at + 4], "big")
+        if data[at + 4 : at + 8] == b"IDAT":
+            chunks.append(data[at + 8 : at + 8 + length])
+        at += 12 + length
+    return b"".join(chunks)
+
+
+@njit(cache=True, nogil=True)
+def undo_filters(filtered: NDArray, rows: NDArray, pixel_bytes: int) -> bool:
+    """Undo what was subtracted from each byte before it was compressed (PNG specification, 9).
+
+    Args:
+        filtered: (height, 1 + row) uint8, each row after the number of its filter.
+        rows: (height, row) uint8, written.
+        pixel_bytes: Bytes a pixel.
+
+    Returns:
+        False where a filter's number has no meaning.
+    """
+    height, width = rows.shape
+    for y in range(height):
+        kind = filtered[y, 0]
+        if kind > 4:
+            return False
+        for channel in range(pixel_bytes):
+            left, corner = 0, 0
+            for x in range(channel, width, pixel_bytes):
+                value = int(filtered[y, x + 1])
+                if kind == 1:
+                    value += left
+                elif kind != 0:
+                    above = int(rows[y - 1, x]) if y > 0 else 0
+                    if kind == 2:
+                        value += above
+                    elif kind == 3:
+                        value += (left + above) // 2
+                    else:
+                        value += _nearest(left, above, corner)
+                    corner = above
+                left = value & 255
+                rows[y, x] = left
+    return True
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _nearest(left: int, above: int, corner: int) -> int:
+    """Paeth's choice: the neighbour that is nearest to left + above - corner."""
+    guess = left + above - corner
+    off_left, off_above, off_corner = abs(guess - left), abs(guess - above), abs(guess - corner)
+    if off_left <= off_above and off_left <= off_corner:
+        return left
+    return above if off_above <= off_corner else corner
