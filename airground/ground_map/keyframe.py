@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import zlib
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from isal import isal_zlib
 from numpy.typing import NDArray
 
 from airground.core.messages import GroundImage
@@ -52,7 +52,7 @@ class GroundKeyframe:
         return cls(
             image.stamp_ns,
             T_ground_camera,
-            zlib.compress(levels.tobytes(), 1),
+            isal_zlib.compress(levels, 1),
             jpeg.tobytes(),
             step_m,
             (depth.shape[0], depth.shape[1]),
@@ -60,7 +60,7 @@ class GroundKeyframe:
 
     def depth(self) -> NDArray[np.float32]:
         """(height, width) [m], 0 where missing."""
-        levels = np.frombuffer(zlib.decompress(self.packed_depth), np.uint16)
+        levels = np.frombuffer(isal_zlib.decompress(self.packed_depth), np.uint16)
         return levels.reshape(self.shape) * np.float32(self.step_m)
 
     def colour(self) -> NDArray[np.uint8]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing
 from itertools import islice, repeat
@@ -43,7 +43,7 @@ def read_ahead(
             future.cancel()
 
 
-def run_ahead(items: Iterable[Item], ahead: int) -> Iterator[Item]:
+def run_ahead(items: Iterable[Item], ahead: int) -> Generator[Item]:
     """The same items, made in a thread of their own; it raises where `items` does.
 
     What makes the items must share nothing that changes with who takes them.

@@ -29,10 +29,12 @@ from airground.core.se3 import SE3
 from airground.core.surface import AerialSurface, DepthMap
 from airground.dense.view_selection import PosedImage
 from airground.errors import InputError
+from airground.io.read_ahead import run_ahead
 from airground.io.recording import Recording
 from airground.pipeline import Pipeline, Sighting, sight
 from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
 from airground.tracking import FrontEnds, Trackers
+from evaluation.run import FRAMES_AHEAD
 from evaluation.watched_front_end import WatchedFrontEnd
 
 ALIGNED_SURFACES = 3
@@ -127,7 +129,8 @@ def play(recording: Recording, config: Config, whole: bool) -> tuple[Material, P
     pipeline = Pipeline(config, recording.mav, recording.ground, rng)
     gathering = _Gathering(recording, config, pipeline)
     started, cpu = time.perf_counter(), time.process_time()
-    for event in pipeline.run(trackers.frames(recording.messages())):
+    frames = trackers.frames(recording.messages())
+    for event in pipeline.run(run_ahead(frames, FRAMES_AHEAD)):
         gathering.take(event)
         if gathering.complete and not whole:
             break

@@ -24,7 +24,9 @@ from tests.dense import synthetic
 from tests.dense.synthetic import SMALL_CAMERA as CAMERA
 
 SMALL = Config(
-    plane_sweep=PlaneSweep(hypotheses=64), fusion=Fusion(voxels=(120, 80, 60), min_depth_maps=2)
+    view_selection=ViewSelection(max_views=16, min_views=5),
+    plane_sweep=PlaneSweep(hypotheses=64),
+    fusion=Fusion(voxels=(120, 80, 60), min_depth_maps=2),
 )
 Flight = tuple[synthetic.World, list[SE3], list[NDArray]]
 

@@ -19,10 +19,20 @@ def frame(index: int, x: float, y: float = 0.0, z: float = 2.0) -> PosedImage:
     return PosedImage(index, IMAGE, SE3(DOWN, np.array([x, y, z])))
 
 
-def test_every_frame_of_a_usual_flight_joins() -> None:
-    views = ViewSet(frame(0, 0.0), PARAMETERS)
+def test_every_frame_of_a_usual_flight_joins_where_16_may() -> None:
+    views = ViewSet(frame(0, 0.0), Parameters(max_views=16))
     joined = [views.offer(frame(i, i * 0.5 / 30)) for i in range(1, 12)]
     assert joined == [True] * 7 + [False] * 4
+    assert views.complete
+    assert views.suffices()
+
+
+def test_every_other_frame_of_a_usual_flight_joins() -> None:
+    views = ViewSet(frame(20, 0.0), PARAMETERS)
+    joined = [views.offer(frame(20 - i, -i * 0.5 / 30)) for i in range(1, 8)]
+    assert joined == [False, True, False, True, False, True, False]
+    joined = [views.offer(frame(20 + i, i * 0.5 / 30)) for i in range(1, 12)]
+    assert joined == [False, True, False, True, False, True, False] + [False] * 4
     assert views.complete
     assert views.suffices()
 
