@@ -31,7 +31,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Flown]:
         for task in tasks:
             seen.append(task)
             row = Row(task.scene, task.seed, 0, CONDITION, "run", "recorded_s", 20.0, "s")
-            yield Outcome([row], None)
+            yield Outcome([[row]], None)
 
     monkeypatch.setattr(suite, "outcomes", outcomes)
     return seen
