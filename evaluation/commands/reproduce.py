@@ -22,7 +22,6 @@ from evaluation.commands.words import (
 if TYPE_CHECKING:
     from evaluation.regression.suite import SuitePlan
     from evaluation.reproduce import Plan
-    from sim.scene import Scene
 
 SCENES = ("indoor_a", "indoor_b", "indoor_c", "flat")
 FLIGHTS, SEQUENCES, TRIALS, BASELINES = 2, 7, 12, 12
@@ -60,11 +59,15 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, Cluste
         None
     )
     """Flights over each scene."""
-    sequences: Annotated[
-        int | None, arg(metavar="N", help_behavior_hint=f"(default: up to {SEQUENCES} a flight)")
+    sequences_per_flight: Annotated[
+        int | None, arg(metavar="N", help_behavior_hint=f"(default: {SEQUENCES})")
     ] = None
-    """Sequences of 12 aerial maps in all, at least; where the flights give fewer, the same
-    scenes and flights follow with the next seeds."""
+    """Sequences of 12 aerial maps a flight, at most."""
+    sequences: Annotated[
+        int | None, arg(metavar="N", help_behavior_hint="(default: what the flights give)")
+    ] = None
+    """At least so many in all: where the flights give fewer, the same scenes and flights follow
+    with the next seeds, `flat` apart."""
     trials: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {TRIALS})")] = (
         None
     )
@@ -104,9 +107,10 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, Cluste
         from evaluation.regression.suite import SUITES, SuitePlan
         from sim.presets import sensor_preset
 
-        fixed = ("quick", "budget", "render", "scenes", "flights", "sequences", "trials")
-        for word in (*fixed, "baselines"):
-            if getattr(self, word):
+        fixed = ("quick", "budget", "render", "scenes", "flights", "sequences_per_flight")
+        for field in (*fixed, "sequences", "trials", "baselines"):
+            if getattr(self, field):
+                word = field.replace("_", "-")
                 raise InputError(f"--{word}: the suite {name} is fixed; give --{word} without it")
         sensors = sensor_preset(self.sensors)
         return SuitePlan(SUITES[name], self.setup(), sensors, self.checked_seed())
@@ -125,36 +129,23 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, Cluste
         if self.render and self.recordings is not None:
             raise InputError("--render keeps no recordings; leave out --recordings")
         names = self.scenes or (QUICK_SCENES if self.quick else SCENES)
-        scenes = [load_scene(name) for name in names]
-        flights = self._count("flights", QUICK_FLIGHTS, FLIGHTS)
         return Plan(
-            scenes=scenes,
-            flights=flights,
+            scenes=[load_scene(name) for name in names],
+            flights=self._count("flights", QUICK_FLIGHTS, FLIGHTS),
             setups=[setup] if self.alone else with_companions(setup, few=self.quick),
             sensors=sensor_preset(self.sensors),
             protocol=Protocol(
-                sequences=self._sequences_a_flight(scenes, flights),
+                sequences=self._count("sequences_per_flight", QUICK_SEQUENCES, SEQUENCES),
                 trials=self._count("trials", QUICK_TRIALS, TRIALS),
                 baselines=self._count("baselines", QUICK_BASELINES, BASELINES, low=0),
             ),
             seed=self.checked_seed(),
             budget=self.budget,
-            sequences=self.sequences or 0,
+            sequences=int(in_range("--sequences", self.sequences or 0)),
         )
-
-    def _sequences_a_flight(self, scenes: list[Scene], flights: int) -> int:
-        """The usual number, or fewer where the flights need not give so many."""
-        from evaluation.results import CONTROL_SCENES
-
-        usual = QUICK_SEQUENCES if self.quick else SEQUENCES
-        if self.sequences is None:
-            return usual
-        wanted = int(in_range("--sequences", self.sequences, low=1))
-        counted = flights * sum(scene.name not in CONTROL_SCENES for scene in scenes)
-        return min(usual, -(-wanted // max(1, counted)))
 
     def _count(self, name: str, quick: int, full: int, low: int = 1) -> int:
         asked = getattr(self, name)
         if asked is None:
             return quick if self.quick else full
-        return int(in_range(f"--{name}", asked, low=low))
+        return int(in_range(f"--{name.replace('_', '-')}", asked, low=low))

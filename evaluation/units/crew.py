@@ -110,7 +110,8 @@ class Crew:
             ) from None
 
     def _start(self) -> Client:
-        self._stack.enter_context(dask.config.set(SETTINGS))
+        settings = {**SETTINGS, "temporary-directory": str(self._scratch)}
+        self._stack.enter_context(dask.config.set(settings))
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
         if self._where is None:
             client = self._stack.enter_context(Client(self._local(), set_as_default=False))
@@ -128,9 +129,8 @@ class Crew:
             threads_per_worker=1,
             processes=True,
             host="127.0.0.1",
-            dashboard_address=None,
+            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
             memory_limit=0,
-            local_directory=str(self._scratch),
             silence_logs=logging.CRITICAL,
         )
         return self._stack.enter_context(cluster)
