@@ -97,7 +97,7 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, Cluste
             resumable_folder(self.out) as folder,
             Crew(self.cluster, self.workers(), plan.tasks(), folder.scratch) as crew,
         ):
-            recordings = self.recordings or folder.path / "recordings"
+            recordings = self.recordings or folder.recordings
             found = plan.measured(None if self.render else recordings, folder.store, crew)
             results = Results(found.table, setup.config, seed, found.showcase)
             summary = results.write(folder.results)

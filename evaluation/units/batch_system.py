@@ -36,6 +36,10 @@ CLASSES = {
 """Systems that Dask-jobqueue knows; `local` runs the jobs here, to try a file out."""
 
 
+WORKERS_MAY_DRAW = "export DASK_DISTRIBUTED__WORKER__DAEMON=False"
+"""Images are drawn by processes that a worker starts, which a daemon may not."""
+
+
 class Jobs(BaseModel):
     """The file, checked; what stands under the system's name is for Dask-jobqueue to check."""
 
@@ -54,16 +58,16 @@ def batch_cluster(file: Path) -> SpecCluster:
     jobs = read_jobs(file)
     ((system, options),) = jobs.jobqueue.items()
     try:
-        jobqueue = importlib.import_module("dask_jobqueue")
+        module = importlib.import_module(f"dask_jobqueue.{system}")
     except ImportError:
         raise InputError(
             f"--cluster {file}: Dask-jobqueue is not installed (pip install dask-jobqueue)"
         ) from None
     if options.get("cores") != options.get("processes"):
         raise InputError(f"--cluster {file}: cores and processes must be the same number")
-    kind = getattr(jobqueue, CLASSES[system], None) or getattr(jobqueue.local, CLASSES[system])
     try:
-        cluster = kind(**options)
+        prologue = [*options.pop("job_script_prologue", []), WORKERS_MAY_DRAW]
+        cluster = getattr(module, CLASSES[system])(**options, job_script_prologue=prologue)
         cluster.scale(jobs=jobs.jobs)
     except (TypeError, ValueError, RuntimeError, OSError) as error:
         raise InputError(f"--cluster {file}: {system}: {error}") from None

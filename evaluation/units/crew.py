@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Self, TypeVar
 
 import dask
 from distributed import Client, KilledWorker, LocalCluster, as_completed
@@ -19,7 +19,7 @@ from distributed.comm import CommClosedError
 
 from airground.errors import AirgroundError, InputError
 from evaluation.units.batch_system import batch_cluster
-from evaluation.units.worker import PreparedWorker
+from evaluation.units.worker import PreparedWorker, unfit
 
 Task = TypeVar("Task")
 Outcome = TypeVar("Outcome")
@@ -118,6 +118,7 @@ class Crew:
             worker = PreparedWorker(self.share(self._workers), str(self._scratch))
         else:
             client = self._stack.enter_context(_joined(self._where, self._stack))
+            _check(client, self._where)
             worker = PreparedWorker(threads=1)
         client.register_plugin(worker)
         self._client = client
@@ -143,20 +144,13 @@ def _joined(where: str, stack: ExitStack) -> Client:
     if "://" not in where:
         raise InputError(f"--cluster {where}: expected tcp://HOST:PORT or a .yaml file")
     try:
-        client = Client(where, timeout=CONNECT_S, set_as_default=False)
+        return Client(where, timeout=CONNECT_S, set_as_default=False)
     except (OSError, ValueError) as error:
         raise InputError(f"--cluster {where}: no Dask scheduler answers there ({error})") from None
-    _check_threads(client, where)
-    return client
 
 
-def _check_threads(client: Client, where: str) -> None:
-    """Compiled kernels use threads of their own, and no two tasks may share a process."""
-    workers: dict[str, Any] = client.scheduler_info(n_workers=-1)["workers"]
-    for address, worker in workers.items():
-        if worker["nthreads"] != 1:
-            client.close()
-            raise InputError(
-                f"--cluster {where}: worker {address} runs {worker['nthreads']} tasks at a time; "
-                "start workers with --nthreads 1"
-            )
+def _check(client: Client, where: str) -> None:
+    """Whether the workers that are there can do our tasks."""
+    for address, fault in client.run(unfit).items():
+        if fault is not None:
+            raise InputError(f"--cluster {where}: worker {address} {fault}")

@@ -12,7 +12,8 @@ from pathlib import Path
 from airground.errors import InputError
 from evaluation.units.store import UnitStore
 
-UNITS, SCRATCH, RESULTS, LOCK = "units", ".scratch", ".results", ".lock"
+UNITS, RECORDINGS = "units", "recordings"
+SCRATCH, RESULTS, LOCK = ".scratch", ".results", ".lock"
 
 
 @dataclass(frozen=True)
@@ -24,12 +25,14 @@ class OutFolder:
         store: Its finished units.
         scratch: For what lives no longer than the run.
         results: Results are written here, and moved to `path` once all are whole.
+        recordings: For those of this run alone; it need not be there.
     """
 
     path: Path
     store: UnitStore
     scratch: Path
     results: Path
+    recordings: Path
 
 
 @contextmanager
@@ -55,12 +58,14 @@ def resumable_folder(path: Path) -> Iterator[OutFolder]:
         raise InputError(f"--out {path}: cannot create it ({error.strerror})") from error
     with lock:
         _take(lock.fileno(), path)
-        scratch, results = path / SCRATCH, path / RESULTS
+        scratch, results, recordings = path / SCRATCH, path / RESULTS, path / RECORDINGS
         try:
-            for folder in (scratch, results):  # a killed run leaves them behind
+            # What a killed run has left behind.
+            for folder in (scratch, results, *recordings.glob(".*.partial")):
                 shutil.rmtree(folder, ignore_errors=True)
-                folder.mkdir()
-            yield OutFolder(path, UnitStore(path / UNITS), scratch, results)
+            scratch.mkdir()
+            results.mkdir()
+            yield OutFolder(path, UnitStore(path / UNITS), scratch, results, recordings)
             for made in sorted(results.iterdir()):
                 _replace(made, path / made.name)
         except OSError as error:
@@ -91,8 +96,6 @@ def _replace(made: Path, place: Path) -> None:
 
 def _remove_if_unused(path: Path) -> None:
     """Leave no folder behind in which nothing was finished."""
-    units = path / UNITS
-    if units.is_dir() and not any(units.iterdir()):
-        units.rmdir()
-    if {file.name for file in path.iterdir()} == {LOCK}:
+    left = {file.name for file in path.iterdir()}
+    if left <= {LOCK, UNITS} and not any((path / UNITS).glob("*")):
         shutil.rmtree(path)

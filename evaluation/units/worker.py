@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
 import signal
 import tempfile
@@ -35,3 +36,15 @@ class PreparedWorker(WorkerPlugin):
             tempfile.tempdir = self.scratch
         if threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who started it
+
+
+def unfit(dask_worker: Worker) -> str | None:
+    """Why a worker cannot do our tasks; called in it by Dask."""
+    if dask_worker.state.nthreads != 1:
+        return "does several tasks in one process; start workers with --nthreads 1"
+    if multiprocessing.current_process().daemon:
+        return (
+            "may start no processes, which draw images; "
+            "start workers with DASK_DISTRIBUTED__WORKER__DAEMON=False in their environment"
+        )
+    return None

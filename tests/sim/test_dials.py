@@ -30,7 +30,7 @@ def with_overlap(share: float) -> Scene:
     return TINY.model_copy(update={"ground": ground})
 
 
-@pytest.mark.parametrize("share", [0.45, 0.6, 0.75])
+@pytest.mark.parametrize("share", [0.55, 0.65, 0.75])
 def test_the_robot_stops_at_the_overlap_that_is_asked_for(share: float) -> None:
     for seed in (0, 1):
         found = float(np.median(overlap_along_flight(world(with_overlap(share), seed))))
@@ -76,7 +76,7 @@ def test_fading_keeps_the_mean_colour_and_scales_the_contrast() -> None:
     half, none = faded(picture, 0.5), faded(picture, 0.0)
     np.testing.assert_allclose(half.mean((0, 1)), picture.mean((0, 1)), rtol=1e-4)
     np.testing.assert_allclose(half.std((0, 1)), 0.5 * picture.std((0, 1)), rtol=1e-4)
-    assert none.std((0, 1)).max() < 1e-3
+    assert np.ptp(none, axis=(0, 1)).max() == 0
     assert half.dtype == np.float32
 
 
