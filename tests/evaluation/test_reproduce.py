@@ -74,7 +74,7 @@ def test_without_a_number_every_flight_is_flown_once() -> None:
     assert flown == [("tiny", 5, 0), ("tiny", 5, 1), ("flat", 5, 0), ("flat", 5, 1)]
 
 
-@settings(max_examples=15)
+@settings(max_examples=15, deadline=None)
 @given(st.integers(1, 60), st.integers(1, 3))
 def test_flights_follow_by_seed_until_there_are_enough(wanted: int, flights: int) -> None:
     flown, found = flown_for(wanted, ("tiny", "indoor_a", "flat"), flights)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airground.config import Config
@@ -139,6 +139,7 @@ def keys(words: list[str]) -> set[str]:
 ALL_KEYS = keys(list(WORDS))
 
 
+@settings(deadline=None)
 @given(st.permutations(WORDS))
 def test_the_order_of_dials_does_not_matter(words: list[str]) -> None:
     assert keys(words) == ALL_KEYS

@@ -136,7 +136,9 @@ def test_a_full_disk_leaves_whole_units_only(
 def test_a_killed_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
     out, flights = tmp_path / "out", tmp_path / "flights"
     command = [sys.executable, "-m", "tests.evaluation.units.killed_run"]
-    process = subprocess.Popen([*command, str(out), str(flights), "2"], start_new_session=True)
+    process = subprocess.Popen(
+        [*command, str(out), str(flights), "6", "0.5", "2"], start_new_session=True
+    )
     deadline = time.monotonic() + 120
     while len(list(out.glob("units/[0-9a-f]*"))) < 2:
         assert process.poll() is None

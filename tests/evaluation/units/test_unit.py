@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airground.config import Config, MonocularSlam
@@ -88,6 +88,7 @@ def leaves(part: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 LEAVES = leaves(UNIT.made_from())
 
 
+@settings(deadline=None)
 @given(
     st.sampled_from(LEAVES),
     st.one_of(st.none(), st.booleans(), st.integers(), st.floats(allow_nan=False), st.text()),
