@@ -33,6 +33,7 @@ class Quantity:
     Attributes:
         name: In files.
         title: For people.
+        short: The same for the head of a narrow column.
         unit: "%" for a share of 1, or that of the value.
         counted: What is counted: "sequences" or "trials".
         read: The reading of one point's rows.
@@ -40,6 +41,7 @@ class Quantity:
 
     name: str
     title: str
+    short: str
     unit: str
     counted: str
     read: Callable[[ResultTable], Reading]
@@ -60,23 +62,24 @@ def _median(metric: str) -> Callable[[ResultTable], Reading]:
 
 QUANTITIES = (
     Quantity(
-        "within_0_50_m_first", "within 0.5 m after 1 aerial map", "%", "sequences",
+        "within_0_50_m_first", "within 0.5 m after 1 aerial map", "0.5 m, 1 map", "%", "sequences",
         lambda table: _of_rate(success_at(table, 1, 0.50)),
     ),
     Quantity(
-        "within_0_25_m_fourth", "within 0.25 m after 4", "%", "sequences",
+        "within_0_25_m_fourth", "within 0.25 m after 4 aerial maps", "0.25 m, 4 maps",
+        "%", "sequences",
         lambda table: _of_rate(success_at(table, 4, 0.25)),
     ),
     Quantity(
-        "within_5cm_2deg", "refined within 5 cm and 2°", "%", "trials",
+        "within_5cm_2deg", "refined within 5 cm and 2°", "5 cm and 2°", "%", "trials",
         lambda table: _of_rate(wilson(*within_5cm_2deg(table))),
     ),
     Quantity(
-        "refined_translation_m", "refined, median position", "m", "trials",
+        "refined_translation_m", "refined, median position", "refined", "m", "trials",
         _median("after_translation_m"),
     ),
     Quantity(
-        "refined_rotation_deg", "refined, median angle", "deg", "trials",
+        "refined_rotation_deg", "refined, median angle", "refined", "deg", "trials",
         _median("after_rotation_deg"),
     ),
 )  # fmt: skip

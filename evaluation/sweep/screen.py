@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
@@ -20,14 +21,17 @@ def print_sweep(
     shown = Table(
         title=f"{', '.join(scene.name for scene in plan.scenes)}: "
         + plan.setup.condition(plan.sensors.name).label(),
-        caption="with 95 % intervals; failures count as failures",
+        caption="within 0.5 and 0.25 m after so many aerial maps, then refined; 95 % intervals; "
+        "failures count as failures",
+        box=SIMPLE,
         title_justify="left",
         caption_justify="left",
     )
     for vary in plan.varied:
-        shown.add_column(vary.name, justify="right", style="bold")
+        name = vary.name.replace(".", ".\n")  # a screen is narrow
+        shown.add_column(name, justify="right", style="bold", overflow="fold")
     for quantity in QUANTITIES:
-        shown.add_column(quantity.title, justify="right")
+        shown.add_column(quantity.short, justify="right")
     for at in measured:
         dials = [str(at.point[vary.name]) for vary in plan.varied]
         shown.add_row(*dials, *(_text(q, at.readings[q.name]) for q in QUANTITIES))
@@ -43,4 +47,4 @@ def _text(quantity: Quantity, reading: Reading) -> str:
         form.format(scale * number) if math.isfinite(number) else "∞"
         for number in (reading.value, reading.low, reading.high)
     )
-    return f"{value}{unit} [{low}, {high}]"
+    return f"{value}{unit}\n[{low}, {high}]"

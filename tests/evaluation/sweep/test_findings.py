@@ -128,9 +128,11 @@ def test_the_screen_shows_a_row_a_point(tmp_path: Path) -> None:
     console = Console(record=True, width=200)
     print_sweep(sweeping, swept(sweeping, tmp_path), console)
     text = console.export_text()
-    assert "localization.particles" in text
-    assert "40 % [" in text
-    assert "100 % [" in text
+    assert "particles" in text
+    assert "40 %" in text
+    assert "100 %" in text
+    rate = swept(sweeping, tmp_path)[0].readings["within_0_25_m_fourth"]
+    assert f"[{100 * rate.low:.0f}, {100 * rate.high:.0f}]" in text
 
 
 @pytest.mark.parametrize(
