@@ -14,6 +14,7 @@ The file is what Dask-jobqueue's own configuration is, for one system, and how m
 from __future__ import annotations
 
 import importlib
+import sys
 from pathlib import Path
 from typing import Any, cast
 
@@ -36,8 +37,11 @@ CLASSES = {
 """Systems that Dask-jobqueue knows; `local` runs the jobs here, to try a file out."""
 
 
-WORKERS_MAY_DRAW = "export DASK_DISTRIBUTED__WORKER__DAEMON=False"
+WORKERS_MAY_DRAW = "DASK_DISTRIBUTED__WORKER__DAEMON=False"
 """Images are drawn by processes that a worker starts, which a daemon may not."""
+
+NO_DASHBOARD = {"dashboard": False, "dashboard_address": "127.0.0.1:0"}
+"""Nobody is to watch from elsewhere, and two runs want no port of the same number."""
 
 
 class Jobs(BaseModel):
@@ -66,8 +70,10 @@ def batch_cluster(file: Path) -> SpecCluster:
     if options.get("cores") != options.get("processes"):
         raise InputError(f"--cluster {file}: cores and processes must be the same number")
     try:
-        prologue = [*options.pop("job_script_prologue", []), WORKERS_MAY_DRAW]
-        cluster = getattr(module, CLASSES[system])(**options, job_script_prologue=prologue)
+        python = f"env {WORKERS_MAY_DRAW} {options.pop('python', sys.executable)}"
+        scheduler = {**NO_DASHBOARD, **options.pop("scheduler_options", {})}
+        kind = getattr(module, CLASSES[system])
+        cluster = kind(**options, python=python, scheduler_options=scheduler)
         cluster.scale(jobs=jobs.jobs)
     except (TypeError, ValueError, RuntimeError, OSError) as error:
         raise InputError(f"--cluster {file}: {system}: {error}") from None

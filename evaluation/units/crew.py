@@ -18,7 +18,7 @@ from distributed import Client, KilledWorker, LocalCluster, as_completed
 from distributed.comm import CommClosedError
 
 from airground.errors import AirgroundError, InputError
-from evaluation.units.batch_system import batch_cluster
+from evaluation.units.batch_system import NO_DASHBOARD, batch_cluster
 from evaluation.units.worker import PreparedWorker, unfit
 
 Task = TypeVar("Task")
@@ -130,7 +130,7 @@ class Crew:
             threads_per_worker=1,
             processes=True,
             host="127.0.0.1",
-            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+            scheduler_kwargs=NO_DASHBOARD,
             memory_limit=0,
             silence_logs=logging.CRITICAL,
         )
