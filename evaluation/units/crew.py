@@ -20,6 +20,7 @@ from distributed.comm import CommClosedError
 from airground.errors import AirgroundError, InputError
 from evaluation.units.batch_system import NO_DASHBOARD, batch_cluster
 from evaluation.units.worker import PreparedWorker, unfit
+from sim.interrupts import end_children
 
 Task = TypeVar("Task")
 Outcome = TypeVar("Outcome")
@@ -67,7 +68,10 @@ class Crew:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._stack.close()
+        try:
+            self._stack.close()
+        except TimeoutError:  # on a busy machine; what was found is not lost for that
+            end_children()
 
     def share(self, tasks: int) -> int:
         """Cores for each of so many tasks, so that few tasks do not leave cores idle."""

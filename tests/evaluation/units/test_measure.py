@@ -139,7 +139,7 @@ def test_a_killed_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
     process = subprocess.Popen(
         [*command, str(out), str(flights), "6", "0.5", "2"], start_new_session=True
     )
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + 600
     while len(list(out.glob("units/[0-9a-f]*"))) < 2:
         assert process.poll() is None
         assert time.monotonic() < deadline
