@@ -26,6 +26,7 @@ VERBS = {
     "run": "Run the pipeline over a recording and measure it against the truth.",
     "evaluate": "Put the results of one or more runs into one report.",
     "reproduce": "Do all of it: the paper's protocol, from scenes to report.",
+    "sweep": "Turn dials, and measure what that does: curves with intervals.",
     "check": "Hold results against accepted ones: better, worse, or no difference seen.",
     "accept": "Accept results: later changes are held against them.",
     "bench": "Time the pipeline's stages on this machine (Table I).",

@@ -76,10 +76,20 @@ class Task:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a task found."""
+    """What a task found.
 
-    rows: list[Row]
+    Attributes:
+        parts: Its rows, by setup.
+        showcase: What pictures need, where it was asked for.
+    """
+
+    parts: list[list[Row]]
     showcase: Showcase | None
+
+    @property
+    def rows(self) -> list[Row]:
+        """All rows, setup by setup."""
+        return [row for part in self.parts for row in part]
 
 
 def run_task(task: Task) -> Outcome:
@@ -93,7 +103,7 @@ def run_task(task: Task) -> Outcome:
 def _measured(recording: Recording, task: Task) -> Outcome:
     truth = Truth.open(recording.path)
     maps = map_recording(recording, truth, task.setups[0], task.seed)
-    rows: list[Row] = []
+    parts: list[list[Row]] = []
     for setup in task.setups:
         out = RowWriter(recording.scene, task.seed, task.flight, setup.condition(recording.sensors))
         _add_run(out, recording, maps)
@@ -107,12 +117,12 @@ def _measured(recording: Recording, task: Task) -> Outcome:
             counts = (task.protocol.trials, task.protocol.baselines)
             seed = (task.seed, task.flight)
             add_baselines(out, recording, truth, setup.config, maps, seed, counts)
-        rows += out.rows
+        parts.append(out.rows)
     showcase = None
     if task.showcase:
         match = task.baselines and task.protocol.baselines > 0
         showcase = make_showcase(recording, truth, maps, task.setups[0], task.seed, match)
-    return Outcome(rows, showcase)
+    return Outcome(parts, showcase)
 
 
 def peak_memory_mib() -> float:

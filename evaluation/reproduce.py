@@ -2,24 +2,38 @@
 
 from __future__ import annotations
 
-import logging
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
-from rich.progress import track
-
-from evaluation.environment import usable_cores
-from evaluation.experiment import Protocol, Task, run_task
-from evaluation.results import ResultTable, Row
-from evaluation.setups import Setup, grouped_by_maps
+from evaluation.experiment import Protocol
+from evaluation.results import CONTROL_SCENES, SEQUENCE_KEYS, ResultTable
+from evaluation.setups import Setup
 from evaluation.showcase import Showcase
-from evaluation.workers import outcomes
+from evaluation.units.crew import Crew
+from evaluation.units.measure import measure
+from evaluation.units.recordings import recorded
+from evaluation.units.store import Finished, UnitStore
+from evaluation.units.unit import Unit, grouped
 from sim.presets import SensorPreset
-from sim.recorder import record
 from sim.rendered import Flight
 from sim.scene import Scene
 
-log = logging.getLogger(__name__)
+
+@dataclass(frozen=True)
+class Findings:
+    """Everything that was measured, and what pictures are drawn from."""
+
+    table: ResultTable
+    showcase: Showcase | None
+
+    @classmethod
+    def of(cls, finished: Sequence[Finished]) -> Findings:
+        """All units' rows in their order, and the first showcase among them."""
+        showcases = [unit.showcase for unit in finished if unit.showcase is not None]
+        table = ResultTable.concat([unit.table for unit in finished])
+        return cls(table, showcases[0] if showcases else None)
 
 
 @dataclass(frozen=True)
@@ -34,6 +48,8 @@ class Plan:
         protocol: How much is measured on each recording.
         seed: Draws the heaps, the flights, the noise and the particles.
         budget: Whether to measure what each stage of the primary setup loses.
+        sequences: At least so many in all of the primary setup, control scenes apart; 0 for
+            those that the flights give.
     """
 
     scenes: list[Scene]
@@ -43,66 +59,83 @@ class Plan:
     protocol: Protocol
     seed: int
     budget: bool = False
+    sequences: int = 0
+
+    def first_flights(self) -> list[Flight]:
+        """Those that are flown in any case."""
+        return [
+            Flight(scene, self.seed, flight, self.sensors)
+            for scene in self.scenes
+            for flight in range(self.flights)
+        ]
+
+    def further_flights(self) -> Iterator[Flight]:
+        """Those that follow as far as sequences are wanting: the same with the next seeds."""
+        scenes = [scene for scene in self.scenes if scene.name not in CONTROL_SCENES]
+        seed = self.seed
+        while scenes:
+            seed += 1
+            for scene in scenes:
+                for flight in range(self.flights):
+                    yield Flight(scene, seed, flight, self.sensors)
+
+    def tasks(self) -> int:
+        """How many tasks the first flights make."""
+        return len(grouped(unit for flight in self.first_flights() for unit in self.units(flight)))
+
+    def measured(self, recordings: Path | None, store: UnitStore, crew: Crew) -> Findings:
+        """Record and measure what is not there yet, flight after flight until there is enough.
+
+        Which flights are flown depends on the plan and on what they gave, not on who flew them.
+
+        Args:
+            recordings: Folder of the recordings; those in it with the right name are used. None
+                keeps none: images are drawn while they are measured, once more for each pass.
+            store: Has the units that an earlier run finished, and takes those of this one.
+            crew: Does the work.
+        """
+        further = self.further_flights()
+        finished = self._flown(self.first_flights(), recordings, store, crew)
+        while (wanting := self.sequences - _sequences(finished[:: len(self.setups)])) > 0:
+            # No flight gives more sequences than this, so that none of them is one too many.
+            flights = list(islice(further, -(-wanting // self.protocol.sequences)))
+            if not flights:
+                break  # only control scenes
+            finished += self._flown(flights, recordings, store, crew)
+        return Findings.of(finished)
+
+    def units(self, flight: Flight, recording: Path | None = None) -> list[Unit]:
+        """What is measured on one flight, drawn on the fly where there is no recording."""
+        return [
+            Unit(
+                recording or flight,
+                flight.seed,
+                flight.flight,
+                setup,
+                self.protocol,
+                showcase=setup is self.setups[0] and flight == self.first_flights()[0],
+                budget=self.budget and setup is self.setups[0],
+                baselines=setup is self.setups[0] and self.protocol.baselines > 0,
+            )
+            for setup in self.setups
+        ]
+
+    def _flown(
+        self, flights: list[Flight], recordings: Path | None, store: UnitStore, crew: Crew
+    ) -> list[Finished]:
+        """The units of each flight, those of the primary setup first."""
+        paths: Sequence[Path | None] = [None] * len(flights)
+        if recordings is not None:
+            paths = recorded(flights, recordings, crew)
+        units = [self.units(flight, path) for flight, path in zip(flights, paths, strict=True)]
+        return measure([unit for of_flight in units for unit in of_flight], store, crew)
 
 
-@dataclass(frozen=True)
-class Findings:
-    """Everything that was measured, and what pictures are drawn from."""
-
-    table: ResultTable
-    showcase: Showcase | None
-
-
-def reproduce(plan: Plan, recordings: Path | None, workers: int | None = None) -> Findings:
-    """Record what is not there yet, and measure all of it.
-
-    Args:
-        plan: What to do.
-        recordings: Folder of the recordings; those in it with the right name are used. None
-            keeps none: images are drawn while they are measured, once more for each pass.
-        workers: Processes at a time; None for one a core. The result does not depend on it.
-    """
-    tasks: list[Task] = []
-    for scene in plan.scenes:
-        for flight in range(plan.flights):
-            what = Flight(scene, plan.seed, flight, plan.sensors)
-            recording = what if recordings is None else _recorded(what, recordings, workers)
-            for setups in grouped_by_maps(plan.setups):
-                tasks.append(
-                    Task(
-                        recording,
-                        plan.seed,
-                        flight,
-                        setups,
-                        plan.protocol,
-                        showcase=not tasks,
-                        budget=plan.budget and setups[0] is plan.setups[0],
-                        baselines=setups[0] is plan.setups[0],
-                    )
-                )
-    workers = workers or usable_cores()
-    renderers = max(1, workers // len(tasks)) if tasks else 1
-    return _measured([replace(task, renderers=renderers) for task in tasks], workers)
-
-
-def _recorded(flight: Flight, folder: Path, workers: int | None) -> Path:
-    """The recording of one flight, made if it is not there yet."""
-    name = f"{flight.scene.name}_{flight.sensors.name}_seed{flight.seed}_flight{flight.flight}"
-    path = folder / name
-    if path.exists():
-        log.info("using the recording %s", path)
-    else:
-        folder.mkdir(parents=True, exist_ok=True)
-        what = flight.scene, flight.seed, flight.sensors
-        record(*what, path, workers=workers, flight=flight.flight)
-    return path
-
-
-def _measured(tasks: list[Task], workers: int) -> Findings:
-    """The tasks' outcomes, in the order of the tasks whatever the order of finishing."""
-    rows: list[Row] = []
-    showcase: Showcase | None = None
-    for outcome in track(outcomes(run_task, tasks, workers), "measuring", total=len(tasks)):
-        rows += outcome.rows
-        showcase = showcase or outcome.showcase
-    return Findings(ResultTable.from_rows(rows), showcase)
+def _sequences(finished: Sequence[Finished]) -> int:
+    """How many there are, control scenes apart."""
+    count = 0
+    for unit in finished:
+        frame = unit.table.rows("localization", "error_m")
+        frame = frame[~frame["scene"].isin(CONTROL_SCENES)]
+        count += len(frame[SEQUENCE_KEYS].drop_duplicates())
+    return count

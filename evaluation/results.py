@@ -15,6 +15,9 @@ from airground.errors import InputError
 CONTROL_SCENES = frozenset({"flat"})
 """Scenes without structure, in which the right answer is to claim nothing."""
 
+CLOCK_STAGES = frozenset({"timing", "run"})
+"""Stages whose rows depend on the machine and on what else it does."""
+
 SEQUENCE_KEYS = ["scene", "seed", "flight", "sequence"]
 TRIAL_KEYS = ["scene", "seed", "flight", "sequence", "trial"]
 
@@ -189,6 +192,10 @@ class ResultTable:
 
     def of_scenes(self, scenes: Iterable[str]) -> ResultTable:
         return ResultTable(self.frame[self.frame["scene"].isin(list(scenes))])
+
+    def without(self, stages: Iterable[str]) -> ResultTable:
+        """Without the rows of some stages."""
+        return ResultTable(self.frame[~self.frame["stage"].isin(list(stages))])
 
     def without_controls(self) -> ResultTable:
         """Without the control scenes, unless there are no others.

@@ -46,12 +46,12 @@ def resolve(
         if not isinstance(values, dict):
             raise ConfigError(f"{file}: {section!r} is no section; known: {_names(Config)}")
         for key, value in values.items():
-            config = _changed(config, section, key, value, str(file))
+            config = with_value(config, section, key, value, str(file))
     if heading is not None:
-        config = _changed(config, "localization", "heading", heading, "--heading")
+        config = with_value(config, "localization", "heading", heading, "--heading")
     for override in overrides:
         section, key, value = _split(override)
-        config = _changed(config, section, key, value, f"--set {override}")
+        config = with_value(config, section, key, value, f"--set {override}")
     return config
 
 
@@ -74,15 +74,23 @@ def _split(override: str) -> tuple[str, str, Any]:
     section, dot, key = name.strip().partition(".")
     if not (equals and dot and section and key):
         raise ConfigError(f"--set {override}: expected SECTION.NAME=VALUE")
+    return section, key, parsed_value(text)
+
+
+def parsed_value(text: str) -> Any:
+    """A value as in TOML, or a word that needs no quotes here."""
     try:
-        value = tomllib.loads(f"value = {text}")["value"]
+        return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
-        value = text.strip()  # a word that needs no quotes here
-    return section, key, value
+        return text.strip()
 
 
-def _changed(config: Config, section: str, key: str, value: Any, origin: str) -> Config:
-    """`config` with one value changed and validated."""
+def with_value(config: Config, section: str, key: str, value: Any, origin: str) -> Config:
+    """`config` with one value changed and validated.
+
+    Raises:
+        ConfigError: There is no such key, or the value is out of its range; names `origin`.
+    """
     part = getattr(config, section, None) if section in Config.model_fields else None
     if not isinstance(part, BaseModel):
         raise ConfigError(f"{origin}: unknown section {section!r}; known: {_names(Config)}")

@@ -51,7 +51,7 @@ class Setup:
 
     def maps_like(self, other: Setup) -> bool:
         """Whether both make the same maps: only what comes after may differ."""
-        unused = {"preset", "localization", "refinement"}
+        unused = {"preset", "height_maps", "localization", "refinement"}
         if self.poses == "oracle":
             unused |= {"monocular_slam", "rgbd_slam"}
         mine, theirs = (s.config.model_dump(exclude=unused) for s in (self, other))

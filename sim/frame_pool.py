@@ -60,8 +60,7 @@ class FrameServer:
     """Gives a plan's frames as they are asked for, drawn a little ahead by other processes.
 
     Asked in order, a robot's frames come without waiting if drawing keeps up; any other order
-    works too, each frame then drawn when it is asked for. A context manager, to be entered by
-    the main thread.
+    works too, each frame then drawn when it is asked for. A context manager.
 
     Args:
         plan: What to make.

@@ -12,7 +12,13 @@ from contextlib import contextmanager
 
 @contextmanager
 def deaf_children() -> Iterator[None]:
-    """Processes that start in here leave Ctrl-C to their parent, from their first import on."""
+    """Processes that start in here leave Ctrl-C to their parent, from their first import on.
+
+    Off the main thread nothing changes, for only that may set how signals are handled.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield

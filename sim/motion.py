@@ -16,6 +16,7 @@ from airground.errors import InputError
 from sim.flight import fly, plan_flight
 from sim.ground_robot import drive, floor_under, mounting, plan_drive
 from sim.magnetic_field import room_field
+from sim.overlap import driven_path
 from sim.robot_motion import ARRAY_NAMES, Mounting, RobotMotion
 from sim.scene import Scene
 from sim.world import World
@@ -133,8 +134,8 @@ def simulate_motion(
         duration_s: Length of the motion; the scene's if None.
 
     Raises:
-        InputError: The duration is not positive or too short to take off, or a path is
-            impossible.
+        InputError: The duration is not positive or too short to take off, or a path or
+            `ground.stop_at_overlap` is impossible.
     """
     length_s = scene.duration_s if duration_s is None else duration_s
     if not (np.isfinite(length_s) and length_s > 0):
@@ -147,7 +148,7 @@ def simulate_motion(
     start_floor = float(floor_under(world.floor_height, start, "mav.start")[0])
     field = room_field(field_rng, -half, half, start_floor)
     flight = plan_flight(scene.mav, start_floor, times, flight_rng)
-    route = plan_drive(scene.ground, world.floor_height, drive_rng)
+    route = plan_drive(driven_path(world), world.floor_height, drive_rng)
     return Motion(
         stamps_ns=stamps_ns,
         mav=fly(flight, 1.0 / RATE_HZ, field),

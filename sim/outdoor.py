@@ -12,8 +12,8 @@ from sim.ground_picture import paint_ground, paint_rock
 from sim.noise import Image
 from sim.pictures import add_picture
 from sim.rocks import Rock
-from sim.scene import Light
-from sim.sheet import light_up
+from sim.scene import Scene
+from sim.sheet import faded, light_up
 from sim.surface import Mesh
 from sim.terrain import HeightField
 
@@ -27,15 +27,16 @@ _PLAIN_ROCK = (0.55, 0.54, 0.52, 1)
 def add_ground(
     spec: mujoco.MjSpec,
     ground: HeightField,
-    light: Light,
+    scene: Scene,
     baker: LightBaker | None,
     rng: np.random.Generator,
 ) -> None:
     """Add the terrain with one picture over all of it, so that no seam shows."""
     if baker:
         size = (float(ground.size_m[0]), float(ground.size_m[1]))
-        unlit = paint_ground(size, GROUND_PX_PER_M, light.azimuth_deg, rng)
-        picture = np.empty_like(unlit)
+        painted = paint_ground(size, GROUND_PX_PER_M, scene.light.azimuth_deg, rng)
+        unlit = faded(painted, scene.texture)
+        picture = np.empty(unlit.shape, np.uint8)
         light_up(unlit, _ground_light(ground, baker), picture)
         add_picture(spec, "ground", picture, cube=False)
     coordinates = ground.picture_coordinates()
@@ -45,6 +46,7 @@ def add_ground(
 def add_rocks(
     spec: mujoco.MjSpec,
     rocks: tuple[Rock, ...],
+    texture: float,
     baker: LightBaker | None,
     rng: np.random.Generator,
 ) -> None:
@@ -52,7 +54,8 @@ def add_rocks(
     for rock, own in zip(rocks, rng.spawn(len(rocks)), strict=True):
         side = int(np.clip(rock.diameter_m * ROCK_PX_PER_M * 0.8, 48, 320))
         if baker:
-            add_picture(spec, rock.name, _rock_picture(rock, side, baker, own), cube=False)
+            picture = _rock_picture(rock, side, texture, baker, own)
+            add_picture(spec, rock.name, picture, cube=False)
         coordinates = _rock_coordinates(rock.vertices.shape[1], side)
         _add_mesh(spec, rock.name, rock.mesh(), coordinates, _PLAIN_ROCK, baker is not None)
 
@@ -96,7 +99,7 @@ def _ground_light(ground: HeightField, baker: LightBaker) -> Image:
 
 
 def _rock_picture(
-    rock: Rock, side: int, baker: LightBaker, rng: np.random.Generator
+    rock: Rock, side: int, texture: float, baker: LightBaker, rng: np.random.Generator
 ) -> NDArray[np.uint8]:
     """(2 side, 3 side, 3): six lit patches."""
     light = baker.shade(rock.vertices.reshape(-1, 3), rock.normals().reshape(-1, 3))
@@ -109,8 +112,8 @@ def _rock_picture(
             source = np.ascontiguousarray(patch[..., part])
             fine[k, ..., part] = cv2.remap(source, map_x, map_y, cv2.INTER_LINEAR)
     centre = rock.vertices.reshape(-1, 3).mean(0)
-    pixels = paint_rock(fine[..., :3] - centre, rock.diameter_m, rng) * fine[..., 3:]
-    lit = np.clip(pixels + 0.5, 0, 255).astype(np.uint8)
+    pixels = faded(paint_rock(fine[..., :3] - centre, rock.diameter_m, rng), texture)
+    lit = np.clip(pixels * fine[..., 3:] + 0.5, 0, 255).astype(np.uint8)
     return lit.reshape(2, 3, side, side, 3).swapaxes(1, 2).reshape(2 * side, 3 * side, 3)
 
 

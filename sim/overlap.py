@@ -1,4 +1,4 @@
-"""How much of what the MAV flies over the ground robot has seen before.
+"""How much of what the MAV flies over the ground robot has seen before, and when it has.
 
 `python -m sim.overlap SCENE [SEED...]` prints it; a scene file states it as
 `overlap_expected`. Computed along the nominal paths by ray casting at low resolution.
@@ -7,13 +7,15 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.paths import heading_path, planar_path
+from airground.errors import InputError
+from sim.paths import cut_headings, heading_path, planar_path
 from sim.ray_caster import RayCaster
-from sim.scene import Scene, load_scene
+from sim.scene import GroundPath, Scene, load_scene
 from sim.world import World, build_world
 
 CELL_M = 0.04
@@ -21,6 +23,7 @@ GROUND_RANGE_M = 4.0
 FLIGHT_STEP_M = 0.7
 _DRIVE_STEP_S = 0.5
 _RISE_S = 3.0
+_REST_S, _REACH_S = 1.0, 1.5  # a heading_path's start, and what its corners' rounding adds
 _GROUND_CAMERA_FORWARD_M = 0.15
 # Focal length, columns and rows of a quarter of the ground camera's and an eighth of the MAV's
 # resolution (its footprint is twice as far away and its cells as large).
@@ -28,22 +31,75 @@ _GROUND_IMAGE = (525 / 4, 160, 120)
 _MAV_IMAGE = (8, 94, 60)
 
 
+@dataclass(frozen=True, eq=False)
+class Sights:
+    """Who sees what, and when, along the nominal paths.
+
+    Attributes:
+        first_seen: (X, Y) when the ground camera first sees each cell of the floor on its whole
+            drive [s]; infinite where it never does.
+        flown: When the MAV is where an aerial map appears, every 0.7 m of flight [s], and the
+            filled cells (X, Y) of its footprint there.
+    """
+
+    first_seen: NDArray[np.float64]
+    flown: list[tuple[float, NDArray[np.bool_]]]
+
+    @classmethod
+    def of(cls, world: World, ground: GroundPath) -> Sights:
+        """With the ground robot on this path."""
+        scene = world.scene
+        caster = RayCaster((world.vertices, world.triangles))
+        shape = np.ceil(np.array(scene.room.size_m) / CELL_M).astype(int)
+        flown = []
+        for time, place in zip(*_flight(scene), strict=True):
+            cells = _cells(_look_down(world, caster, place), scene, shape)
+            footprint = np.zeros(shape, bool)
+            footprint[cells[:, 0], cells[:, 1]] = True
+            flown.append((float(time), footprint))
+        return cls(_first_seen(world, ground, caster, shape), flown)
+
+    def shares(self, until_s: float = np.inf) -> NDArray[np.float64]:
+        """(K,) share of each footprint that the robot has seen by then, if it stops at a time."""
+        return np.array(
+            [(self.first_seen[seen] <= min(time, until_s)).mean() for time, seen in self.flown]
+        )
+
+
 def overlap_along_flight(world: World) -> NDArray[np.float64]:
     """(K,) share of the MAV's footprint, in filled cells, that the robot has seen by then.
 
     One entry every 0.7 m of flight, as often as an aerial map appears.
     """
-    scene = world.scene
-    caster = RayCaster((world.vertices, world.triangles))
-    shape = np.ceil(np.array(scene.room.size_m) / CELL_M).astype(int)
-    first_seen = _first_seen(world, caster, shape)
-    shares = []
-    for time, place in zip(*_flight(scene), strict=True):
-        cells = _cells(_look_down(world, caster, place), scene, shape)
-        footprint = np.zeros(shape, bool)
-        footprint[cells[:, 0], cells[:, 1]] = True
-        shares.append(float((first_seen[footprint] <= time).mean()))
-    return np.array(shares)
+    return Sights.of(world, driven_path(world)).shares()
+
+
+def driven_path(world: World) -> GroundPath:
+    """The ground robot's path, cut where `ground.stop_at_overlap` has it stop.
+
+    Raises:
+        InputError: It sees more than that before it moves, or less on its whole drive.
+    """
+    scene, ground = world.scene, world.scene.ground
+    wanted = ground.stop_at_overlap
+    if wanted is None:
+        return ground
+    sights = Sights.of(world, ground)
+    stops = np.arange(0, scene.duration_s, _DRIVE_STEP_S)
+    reached = np.array([np.median(sights.shares(stop)) for stop in stops])
+    moving = _REST_S + _REACH_S + _DRIVE_STEP_S
+    least, most = reached[np.searchsorted(stops, moving)], reached[-1]
+    if not least <= wanted <= most:
+        raise InputError(
+            f"scene '{scene.name}', seed {world.seed}: ground.stop_at_overlap = {wanted:g} cannot "
+            f"be had: the robot sees {least:.2f} as it sets off and {most:.2f} on its whole drive"
+        )
+    stop_s = max(moving, float(stops[np.argmax(reached >= wanted)]))
+    waypoints = np.array(ground.waypoints) * [1, 1, np.pi / 180]
+    driven_s = stop_s - _REST_S - _REACH_S
+    cut = cut_headings(waypoints, ground.speed_mps, np.radians(ground.turn_dps), driven_s)
+    kept = tuple((float(x), float(y), float(np.rad2deg(heading))) for x, y, heading in cut)
+    return ground.model_copy(update={"waypoints": kept})
 
 
 def measured_overlap(scene: Scene, seeds: tuple[int, ...] = (0, 1, 2)) -> float:
@@ -63,11 +119,12 @@ def _flight(scene: Scene) -> tuple[NDArray, NDArray]:
     return times[keep], places[keep]
 
 
-def _first_seen(world: World, caster: RayCaster, shape: NDArray) -> NDArray:
+def _first_seen(
+    world: World, ground: GroundPath, caster: RayCaster, shape: NDArray
+) -> NDArray[np.float64]:
     """(X, Y) when the ground camera first saw each cell [s]; infinite where it never did."""
-    ground = world.scene.ground
     waypoints = np.array(ground.waypoints) * [1, 1, np.pi / 180]
-    path = heading_path(waypoints, ground.speed_mps, np.radians(ground.turn_dps), 1.0)
+    path = heading_path(waypoints, ground.speed_mps, np.radians(ground.turn_dps), _REST_S)
     first = np.full(shape, np.inf)
     pitch = np.radians(ground.camera_pitch_deg)
     for time in np.arange(0, min(path.end_s, world.scene.duration_s), _DRIVE_STEP_S):

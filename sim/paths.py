@@ -123,6 +123,31 @@ def heading_path(
     Raises:
         InputError: As for `planar_path`, or a yaw rate that is not positive.
     """
+    points, durations = _timed_headings(waypoints, speed_mps, turn_rps)
+    return _timed_path(points, durations, start_s, rounding_s)
+
+
+def cut_headings(
+    waypoints: ArrayLike, speed_mps: float, turn_rps: float, driven_s: float
+) -> NDArray[np.float64]:
+    """(M, 3) the waypoints of a `heading_path` that ends after driving for so long.
+
+    The last one lies where the path, its corners not rounded, is then.
+
+    Raises:
+        InputError: As for `heading_path`, or the time is not positive.
+    """
+    _check_positive("driven_s", driven_s)
+    points, durations = _timed_headings(waypoints, speed_mps, turn_rps)
+    passed = np.concatenate([[0.0], np.cumsum(durations)])
+    last = [np.interp(driven_s, passed, column) for column in points.T]
+    return np.append(points[passed < driven_s], [last], axis=0)
+
+
+def _timed_headings(
+    waypoints: ArrayLike, speed_mps: float, turn_rps: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(K, 3) checked waypoints with their headings unwrapped, and (K - 1,) durations [s]."""
     points = _checked_waypoints(waypoints, 3, "waypoints must be [x, y, heading]").copy()
     _check_positive("speed_mps", speed_mps)
     _check_positive("turn rate", turn_rps)
@@ -131,7 +156,7 @@ def heading_path(
     durations = np.maximum(
         np.linalg.norm(moves[:, :2], axis=1) / speed_mps, np.abs(moves[:, 2]) / turn_rps
     )
-    return _timed_path(points, durations, start_s, rounding_s)
+    return points, durations
 
 
 def _timed_path(

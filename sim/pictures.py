@@ -13,7 +13,7 @@ from airground.core.se3 import SE3
 from sim.bake_light import LightBaker
 from sim.cardboard import FaceKind, Make, paint_face
 from sim.rubble import Box
-from sim.sheet import light_up
+from sim.sheet import faded, light_up
 
 # What a cube texture shows on each face of a box, in MuJoCo's order: outward normal, and the
 # box axes along which columns and rows grow (OpenGL's convention; a rendered test pins it).
@@ -52,22 +52,26 @@ def add_picture(spec: mujoco.MjSpec, name: str, pixels: NDArray[np.uint8], cube:
 
 
 def paint_boxes(
-    boxes: tuple[Box, ...], makes: list[Make], baker: LightBaker, rng: np.random.Generator
+    boxes: tuple[Box, ...],
+    makes: list[Make],
+    texture: float,
+    baker: LightBaker,
+    rng: np.random.Generator,
 ) -> list[NDArray[np.uint8]]:
-    """The lit cube picture (6 side, side, 3) of every box."""
+    """The lit cube picture (6 side, side, 3) of every box; `texture` is its contrast."""
     if not boxes:
         return []
     light = _face_light(boxes, baker)
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
         jobs = [
-            pool.submit(_cube_picture, box, makes[box.make], light[i], own)
+            pool.submit(_cube_picture, box, makes[box.make], texture, light[i], own)
             for i, (box, own) in enumerate(zip(boxes, rng.spawn(len(boxes)), strict=True))
         ]
         return [job.result() for job in jobs]
 
 
 def _cube_picture(
-    box: Box, make: Make, light: NDArray[np.float32], rng: np.random.Generator
+    box: Box, make: Make, texture: float, light: NDArray[np.float32], rng: np.random.Generator
 ) -> NDArray[np.uint8]:
     side = _resolution(box.size_m)
     cube = np.empty((6 * side, side, 3), np.uint8)
@@ -75,7 +79,7 @@ def _cube_picture(
         right, down = _upright(normal)
         size = tuple(float(np.abs(axis) @ box.size_m) for axis in (right, down))
         kind: FaceKind = "flaps" if normal[2] else "end" if normal[0] else "side"
-        pixels = paint_face(make, (size[0], size[1]), kind, side, rng)
+        pixels = faded(paint_face(make, (size[0], size[1]), kind, side, rng), texture)
         turned = np.ascontiguousarray(np.rot90(pixels, _quarter_turns(right, down, columns, rows)))
         light_up(turned, light[index], cube[index * side : (index + 1) * side])
     return cube

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from airground.errors import InputError
+from sim.magnetic_field import EARTH_FIELD_WORLD
 
 
 @dataclass(frozen=True)
@@ -162,3 +163,40 @@ def sensor_preset(name: str) -> SensorPreset:
     if name not in PRESETS:
         raise InputError(f"unknown sensor preset '{name}': known are {', '.join(PRESETS)}")
     return PRESETS[name]
+
+
+def with_noise(preset: SensorPreset, factor: float) -> SensorPreset:
+    """The preset with `factor` times the noise of images, depth and inertial sensors.
+
+    What is no noise stays: the optics, steps of disparity, limits of depth, the magnetometers
+    and the errors of the calibration.
+    """
+    image, depth, imu = preset.image, preset.depth, preset.imu
+    return replace(
+        preset,
+        image=image
+        and replace(
+            image,
+            read_noise=factor * image.read_noise,
+            shot_noise=factor**2 * image.shot_noise,  # a variance
+        ),
+        depth=depth
+        and replace(
+            depth,
+            axial_scale=factor * depth.axial_scale,
+            lateral_px=factor * depth.lateral_px,
+        ),
+        imu=imu and ImuNoise(**{name: factor * value for name, value in vars(imu).items()}),
+    )
+
+
+def with_heading_error(preset: SensorPreset, deviation_deg: float) -> SensorPreset:
+    """The preset with headings of each robot's magnetometer that are off by this deviation.
+
+    All of it is hard iron, which turns with the robot; the room's own anomaly is left out, so
+    that the error is what is asked for.
+    """
+    horizontal_t = float(np.hypot(*EARTH_FIELD_WORLD[:2]))
+    noise_t = preset.magnetic.noise_t if preset.magnetic else 0.0
+    iron_t = horizontal_t * float(np.tan(np.deg2rad(deviation_deg)))
+    return replace(preset, magnetic=MagneticNoise(noise_t, iron_t, 0.0))

@@ -32,12 +32,14 @@ class Flight:
         seed: Decides the heap and, with `flight`, motion and noise.
         flight: Which flight over the same heap.
         sensors: How good the sensors are.
+        duration_s: Cuts the flight short; the scene's own length if None.
     """
 
     scene: Scene
     seed: int
     flight: int
     sensors: SensorPreset
+    duration_s: float | None = None
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ def _prepare(root: Path, flight: Flight) -> tuple[FramePlan, Header]:
     """Write all but the images, and the world to draw them from."""
     what = flight.scene, flight.seed, flight.flight, flight.sensors
     try:
-        header, plan = write_all_but_images(root, *what, None)
+        header, plan = write_all_but_images(root, *what, flight.duration_s)
         recording_writer.finish(root, header, {})
         store_model(plan, flight.scene, flight.seed)
     except OSError as error:

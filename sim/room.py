@@ -12,7 +12,7 @@ from sim.floor import paint_concrete, paint_plaster, paint_print
 from sim.noise import Image
 from sim.pictures import add_picture
 from sim.scene import Room
-from sim.sheet import light_up
+from sim.sheet import faded, light_up
 from sim.surface import Mesh, join, rectangle_mesh
 
 FLOOR_PX_PER_M = 480.0
@@ -24,16 +24,21 @@ COLLISION_GROUP = 3
 
 
 def add_room(
-    spec: mujoco.MjSpec, room: Room, baker: LightBaker | None, rng: np.random.Generator
+    spec: mujoco.MjSpec,
+    room: Room,
+    texture: float,
+    baker: LightBaker | None,
+    rng: np.random.Generator,
 ) -> None:
     """Add the floor, the walls and the invisible plane on which things stand.
 
     Args:
+        texture: Contrast of the pictures, 1 as drawn.
         baker: Lights the pictures; without it, surfaces get plain colours.
         rng: Draws the pictures.
     """
     add_ground_plane(spec)
-    _add_floor(spec, room, baker, rng)
+    _add_floor(spec, room, texture, baker, rng)
     for index, (centre, normal, half_width) in enumerate(_walls(room)):
         name = f"wall_{index}"
         half_size = np.array([half_width, room.wall_height_m / 2])
@@ -42,12 +47,16 @@ def add_room(
             right = np.cross([0.0, 0.0, 1.0], normal)
             up = np.array([0, 0, half_size[1]])
             light = _light_map(baker, centre, right * half_size[0], up, WALL_LIGHT_CELL_M)
-            add_picture(spec, name, _lit(pixels, light), cube=False)
+            add_picture(spec, name, _lit(faded(pixels, texture), light), cube=False)
         _add_panel(spec, name, half_size, centre, _wall_quaternion(normal), baker is not None)
 
 
 def _add_floor(
-    spec: mujoco.MjSpec, room: Room, baker: LightBaker | None, rng: np.random.Generator
+    spec: mujoco.MjSpec,
+    room: Room,
+    texture: float,
+    baker: LightBaker | None,
+    rng: np.random.Generator,
 ) -> None:
     """One picture over the whole floor, so that nothing repeats and no seam shows."""
     half = np.array(room.size_m) / 2
@@ -55,8 +64,8 @@ def _add_floor(
         paint = paint_concrete if room.floor == "concrete" else paint_print
         right, up = np.array([half[0], 0, 0]), np.array([0, half[1], 0])
         light = _light_map(baker, np.zeros(3), right, up, FLOOR_LIGHT_CELL_M)
-        picture = _lit(paint(room.size_m, FLOOR_PX_PER_M, rng), light)
-        add_picture(spec, "floor", picture, cube=False)
+        pixels = faded(paint(room.size_m, FLOOR_PX_PER_M, rng), texture)
+        add_picture(spec, "floor", _lit(pixels, light), cube=False)
     _add_panel(spec, "floor", half, np.zeros(3), np.array([1.0, 0, 0, 0]), baker is not None)
 
 

@@ -127,7 +127,7 @@ def _draw_boxes(rubble: Rubble, rng: np.random.Generator) -> tuple[NDArray, NDAr
     edges = edges[:, [2, 1, 0]]  # longest first: a box stands on its largest face
     makes = rng.integers(0, rubble.makes, rubble.boxes)
     makes[rng.random(rubble.boxes) < rubble.self_similarity] = 0
-    return makes, np.round(edges[makes], 3)
+    return makes, np.round(rubble.size_scale * edges[makes], 3)
 
 
 class _Heap:

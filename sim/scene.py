@@ -59,6 +59,8 @@ class Rubble(Part):
     """0 drops boxes upright and aligned with the room, 1 in any orientation."""
     clearance_m: Positive = 0.45
     """No box comes closer to the ground robot's path than this [m]."""
+    size_scale: Annotated[float, Field(ge=0.1, le=1.5)] = 1.0
+    """Every box is so many times as large as drawn; so the heap is about so much higher."""
 
     @model_validator(mode="after")
     def _edges_in_order(self) -> Rubble:
@@ -131,6 +133,9 @@ class GroundPath(Part):
     """Largest yaw rate [deg/s]."""
     waypoints: Annotated[tuple[tuple[float, float, float], ...], Field(min_length=2)]
     """x [m], y [m] and heading [deg, 0 looks along +x, counter-clockwise]."""
+    stop_at_overlap: Fraction | None = None
+    """The robot stops as soon as it has seen this share of what the MAV flies over (the median
+    that `sim.overlap` measures); without it, it drives all the way. The heap stays the same."""
 
 
 class Scene(Part):
@@ -144,6 +149,9 @@ class Scene(Part):
     """Length of a recording [s]."""
     overlap_expected: Fraction
     """Median share of the MAV's footprint that the ground robot has seen before."""
+    texture: Fraction = 1.0
+    """Contrast of all pictures: 1 as drawn, 0 leaves every surface its mean colour and the
+    light on it."""
     room: Room
     light: Light = Light()
     rubble: Rubble | None = None

@@ -79,6 +79,17 @@ def _blend(pixels: NDArray, colour: NDArray, cover: NDArray) -> None:
                     pixels[i, j, c] += (colour[c] - pixels[i, j, c]) * f
 
 
+def faded(pixels: NDArray, contrast: float) -> NDArray:
+    """A picture (..., 3) of display values, its contrast around its mean colour times a share.
+
+    With a share of 1 it is the same picture; else it is float32.
+    """
+    if contrast == 1.0:
+        return pixels
+    mean = pixels.mean(axis=tuple(range(pixels.ndim - 1)), dtype=np.float64)
+    return np.asarray(mean + contrast * (pixels - mean), np.float32)
+
+
 @njit(cache=True, error_model="numpy", nogil=True)
 def light_up(pixels: NDArray, light: NDArray, out: NDArray) -> None:
     """Stretch a picture over `out`, multiply by the stretched light, round to bytes.

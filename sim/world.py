@@ -86,7 +86,7 @@ def build_world(scene: Scene, seed: int, pictures: bool = True) -> World:
     # Walls throw no shadows, for the lamps hang inside the room.
     floor = room_mesh(scene.room.model_copy(update={"wall_height_m": 0.0}))
     baker = _baker(scene, floor, box_meshes, _CONCRETE, _CARDBOARD) if pictures else None
-    add_room(spec, scene.room, baker, picture_rng)
+    add_room(spec, scene.room, scene.texture, baker, picture_rng)
     _add_boxes(spec, scene, boxes, baker, picture_rng)
     return World(scene, seed, spec, *surface, boxes)
 
@@ -104,8 +104,8 @@ def _build_outdoor(
     rock_meshes = [rock.mesh() for rock in rocks]
     spec = _empty_spec(pictures)
     baker = _baker(scene, ground.mesh(), rock_meshes, _SOIL, _STONE) if pictures else None
-    add_ground(spec, ground, scene.light, baker, picture_rng)
-    add_rocks(spec, rocks, baker, picture_rng)
+    add_ground(spec, ground, scene, baker, picture_rng)
+    add_rocks(spec, rocks, scene.texture, baker, picture_rng)
     return World(scene, seed, spec, *join([ground.mesh(), *rock_meshes]), (), ground)
 
 
@@ -149,7 +149,7 @@ def _add_boxes(
     if baker and scene.rubble:
         names = rng.permutation(BRANDS)
         makes = [Make.draw(rng, str(names[k % len(names)])) for k in range(scene.rubble.makes)]
-        pictures = paint_boxes(boxes, makes, baker, rng)
+        pictures = paint_boxes(boxes, makes, scene.texture, baker, rng)
         for box, picture in zip(boxes, pictures, strict=True):
             add_picture(spec, box.name, picture, cube=True)
     for box in boxes:

@@ -9,12 +9,19 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from tyro.conf import arg
 
 from airground.errors import InputError
-from evaluation.commands.words import OutWord, SeedWord, SensorWord, SetupWords, Verb, in_range
+from evaluation.commands.words import (
+    ClusterWord,
+    ResumableOutWord,
+    SeedWord,
+    SensorWord,
+    SetupWords,
+    Verb,
+    in_range,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from evaluation.reproduce import Findings, Plan
+    from evaluation.regression.suite import SuitePlan
+    from evaluation.reproduce import Plan
 
 SCENES = ("indoor_a", "indoor_b", "indoor_c", "flat")
 FLIGHTS, SEQUENCES, TRIALS, BASELINES = 2, 7, 12, 12
@@ -25,7 +32,7 @@ QUICK_FLIGHTS, QUICK_SEQUENCES, QUICK_TRIALS, QUICK_BASELINES = 1, 4, 8, 0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reproduce(Verb, SetupWords, SensorWord, SeedWord, OutWord):
+class Reproduce(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, ClusterWord):
     """Do all of it: the paper's protocol, from scenes to report.
 
     Records flights over several scenes, measures the setup asked for and, beside it, those
@@ -52,10 +59,15 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, OutWord):
         None
     )
     """Flights over each scene."""
-    sequences: Annotated[
+    sequences_per_flight: Annotated[
         int | None, arg(metavar="N", help_behavior_hint=f"(default: {SEQUENCES})")
     ] = None
-    """Sequences of 12 aerial maps a flight."""
+    """Sequences of 12 aerial maps a flight, at most."""
+    sequences: Annotated[
+        int | None, arg(metavar="N", help_behavior_hint="(default: what the flights give)")
+    ] = None
+    """At least so many in all: where the flights give fewer, the same scenes and flights follow
+    with the next seeds, `flat` apart."""
     trials: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {TRIALS})")] = (
         None
     )
@@ -74,36 +86,34 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, OutWord):
     The results are the same, but for times, which then include waiting for images."""
 
     def main(self) -> None:
-        from evaluation.output import fresh_folder
         from evaluation.results_folder import Results
         from evaluation.screen import print_summary
+        from evaluation.units.crew import Crew
+        from evaluation.units.out_folder import resumable_folder
 
-        measure = self._protocol() if self.suite is None else self._suite(self.suite)
+        plan = self.plan() if self.suite is None else self._suite(self.suite)
         setup, seed = self.setup(), self.checked_seed()
-        with fresh_folder(self.out) as folder:
-            findings = measure(self.recordings or folder / "recordings")
-            summary = Results(findings.table, setup.config, seed, findings.showcase).write(folder)
+        with (
+            resumable_folder(self.out) as folder,
+            Crew(self.cluster, self.workers(), plan.tasks(), folder.scratch) as crew,
+        ):
+            recordings = self.recordings or folder.recordings
+            found = plan.measured(None if self.render else recordings, folder.store, crew)
+            results = Results(found.table, setup.config, seed, found.showcase)
+            summary = results.write(folder.results)
         print_summary(summary)
 
-    def _protocol(self) -> Callable[[Path], Findings]:
-        from evaluation.reproduce import reproduce
+    def _suite(self, name: str) -> SuitePlan:
+        from evaluation.regression.suite import SUITES, SuitePlan
+        from sim.presets import sensor_preset
 
-        plan = self.plan()
-        return lambda recordings: reproduce(
-            plan, None if self.render else recordings, self.workers()
-        )
-
-    def _suite(self, name: str) -> Callable[[Path], Findings]:
-        from evaluation.regression.suite import SUITES, run_suite
-
-        fixed = ("quick", "budget", "render", "scenes", "flights", "sequences", "trials")
-        for word in (*fixed, "baselines"):
-            if getattr(self, word):
+        fixed = ("quick", "budget", "render", "scenes", "flights", "sequences_per_flight")
+        for field in (*fixed, "sequences", "trials", "baselines"):
+            if getattr(self, field):
+                word = field.replace("_", "-")
                 raise InputError(f"--{word}: the suite {name} is fixed; give --{word} without it")
-        setup, seed = self.setup(), self.checked_seed()
-        return lambda recordings: run_suite(
-            SUITES[name], setup, self.sensors, seed, recordings, self.workers()
-        )
+        sensors = sensor_preset(self.sensors)
+        return SuitePlan(SUITES[name], self.setup(), sensors, self.checked_seed())
 
     def plan(self) -> Plan:
         """What the words ask for, checked."""
@@ -118,23 +128,24 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, OutWord):
             raise InputError("--budget asks what SLAM loses among others; give --poses slam")
         if self.render and self.recordings is not None:
             raise InputError("--render keeps no recordings; leave out --recordings")
-        scenes = self.scenes or (QUICK_SCENES if self.quick else SCENES)
+        names = self.scenes or (QUICK_SCENES if self.quick else SCENES)
         return Plan(
-            scenes=[load_scene(scene) for scene in scenes],
+            scenes=[load_scene(name) for name in names],
             flights=self._count("flights", QUICK_FLIGHTS, FLIGHTS),
             setups=[setup] if self.alone else with_companions(setup, few=self.quick),
             sensors=sensor_preset(self.sensors),
             protocol=Protocol(
-                sequences=self._count("sequences", QUICK_SEQUENCES, SEQUENCES),
+                sequences=self._count("sequences_per_flight", QUICK_SEQUENCES, SEQUENCES),
                 trials=self._count("trials", QUICK_TRIALS, TRIALS),
                 baselines=self._count("baselines", QUICK_BASELINES, BASELINES, low=0),
             ),
             seed=self.checked_seed(),
             budget=self.budget,
+            sequences=int(in_range("--sequences", self.sequences or 0)),
         )
 
     def _count(self, name: str, quick: int, full: int, low: int = 1) -> int:
         asked = getattr(self, name)
         if asked is None:
             return quick if self.quick else full
-        return int(in_range(f"--{name}", asked, low=low))
+        return int(in_range(f"--{name.replace('_', '-')}", asked, low=low))

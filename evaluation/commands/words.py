@@ -48,6 +48,25 @@ class OutWord:
 
 
 @dataclass(frozen=True, kw_only=True)
+class ResumableOutWord:
+    """Where results go that may take long."""
+
+    out: Annotated[Path, arg(metavar="DIR")]
+    """Folder to make; given again, the run goes on where it stopped, whatever stopped it."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClusterWord:
+    """Who does the work."""
+
+    cluster: Annotated[
+        str | None,
+        arg(metavar="tcp://HOST:PORT|FILE.yaml", help_behavior_hint="(default: this machine)"),
+    ] = None
+    """A Dask scheduler that is there, or jobs of a batch system (docs/sweep.md)."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class SeedWord:
     """Where randomness comes from."""
 

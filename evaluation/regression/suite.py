@@ -7,19 +7,20 @@ only if all agree; of twelve, one may move a little the other way.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.progress import track
-
-from evaluation.environment import usable_cores
-from evaluation.experiment import Outcome, Protocol, Task, run_task
+from evaluation.experiment import Protocol
 from evaluation.reproduce import Findings
-from evaluation.results import ResultTable
 from evaluation.setups import Setup
-from evaluation.workers import outcomes
-from sim.presets import sensor_preset
-from sim.recorder import record
+from evaluation.units.crew import Crew
+from evaluation.units.measure import measure
+from evaluation.units.recordings import recorded
+from evaluation.units.store import UnitStore
+from evaluation.units.unit import Unit
+from sim.presets import SensorPreset
+from sim.rendered import Flight
 from sim.scene import load_scene
 
 SEEDS_APART = 100
@@ -60,72 +61,61 @@ SUITES = {
 
 
 @dataclass(frozen=True)
-class Flown:
-    """One flight of a suite, to be recorded and measured in one process."""
+class SuitePlan:
+    """A suite to be flown.
 
-    scene: str
-    seed: int
-    duration_s: float
-    sensors: str
-    recording: Path
-    setup: Setup
-    protocol: Protocol
-    showcase: bool
-
-
-def run_suite(
-    suite: Suite,
-    setup: Setup,
-    sensors: str,
-    seed: int,
-    recordings: Path,
-    workers: int | None = None,
-) -> Findings:
-    """Record what is not there yet, and measure one setup.
-
-    Args:
+    Attributes:
         suite: What to fly.
         setup: What to measure.
         sensors: How good the sensors are.
         seed: Of the heaps, the flights, the noise and the particles.
-        recordings: Folder of the recordings; those in it with the right name are used.
-        workers: Processes at a time; None for one a core. The result does not depend on it.
     """
-    flown = [
-        Flown(
-            scene=flights.scene,
-            seed=SEEDS_APART * seed + index,
-            duration_s=flights.duration_s,
-            sensors=sensors,
-            recording=recordings / f"{flights.scene}_{sensors}_seed{SEEDS_APART * seed + index}"
-            f"_{flights.duration_s:g}s",
-            setup=setup,
-            protocol=suite.protocol,
-            showcase=flights is suite.flights[0] and index == 0,
-        )
-        for flights in suite.flights
-        for index in range(flights.count)
-    ]
-    recordings.mkdir(parents=True, exist_ok=True)
-    made = outcomes(fly, flown, workers or usable_cores())
-    found = list(track(made, "recording and measuring", total=len(flown)))
-    rows = [row for outcome in found for row in outcome.rows]
-    return Findings(ResultTable.from_rows(rows), found[0].showcase)
 
+    suite: Suite
+    setup: Setup
+    sensors: SensorPreset
+    seed: int
 
-def fly(flown: Flown) -> Outcome:
-    """Record one flight, unless that was done before, and measure it."""
-    if not flown.recording.exists():
-        record(
-            load_scene(flown.scene),
-            flown.seed,
-            sensor_preset(flown.sensors),
-            flown.recording,
-            flown.duration_s,
-            workers=1,
-            quiet=True,
-        )
-    task = Task(
-        flown.recording, flown.seed, 0, [flown.setup], flown.protocol, showcase=flown.showcase
-    )
-    return run_task(task)
+    def flights(self) -> list[Flight]:
+        """All flights in their order, each over a heap of its own."""
+        return [
+            Flight(
+                load_scene(flights.scene),
+                SEEDS_APART * self.seed + index,
+                0,
+                self.sensors,
+                flights.duration_s,
+            )
+            for flights in self.suite.flights
+            for index in range(flights.count)
+        ]
+
+    def tasks(self) -> int:
+        """How many tasks they make."""
+        return sum(flights.count for flights in self.suite.flights)
+
+    def measured(self, recordings: Path | None, store: UnitStore, crew: Crew) -> Findings:
+        """Record what is not there yet, and measure one setup.
+
+        Args:
+            recordings: Folder of the recordings; those in it with the right name are used. None
+                keeps none.
+            store: Has the units that an earlier run finished, and takes those of this one.
+            crew: Does the work; the result does not depend on it.
+        """
+        flights = self.flights()
+        made: Sequence[Path | Flight] = flights
+        if recordings is not None:
+            made = recorded(flights, recordings, crew)
+        units = [
+            Unit(
+                recording,
+                flight.seed,
+                flight.flight,
+                self.setup,
+                self.suite.protocol,
+                showcase=flight is flights[0],
+            )
+            for flight, recording in zip(flights, made, strict=True)
+        ]
+        return Findings.of(measure(units, store, crew))

@@ -7,7 +7,7 @@ import pytest
 
 from airground.config import Config
 from evaluation.experiment import Protocol, Task, run_task
-from evaluation.results import Row
+from evaluation.results import CLOCK_STAGES, Row
 from evaluation.setups import Setup
 from sim.presets import NOMINAL
 from sim.recorder import record
@@ -15,13 +15,10 @@ from sim.rendered import Flight
 from sim.scene import parse_scene
 from tests.sim.small_flight import SCENE
 
-CLOCK = {"timing", "run"}
-"""Stages whose rows depend on the machine."""
-
 
 def measured(rows: list[Row]) -> list[str]:
     """All that must agree, in words, for a missing value is not equal to itself."""
-    return [repr(row) for row in rows if row.stage not in CLOCK]
+    return [repr(row) for row in rows if row.stage not in CLOCK_STAGES]
 
 
 @pytest.mark.slow

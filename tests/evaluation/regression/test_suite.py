@@ -2,55 +2,59 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
 
 from airground.config import Config
 from evaluation.comparison import least_paired_p
-from evaluation.experiment import Outcome
+from evaluation.experiment import Protocol
 from evaluation.regression import suite
 from evaluation.regression.metrics import WATCHED
-from evaluation.regression.suite import SUITES, Flown, fly, run_suite
+from evaluation.regression.suite import SUITES, Flights, Suite, SuitePlan
 from evaluation.regression.verdict import ALPHA
-from evaluation.results import CONTROL_SCENES, Row
+from evaluation.results import CONTROL_SCENES, ResultTable, Row
 from evaluation.setups import Setup
+from evaluation.units.crew import Crew
+from evaluation.units.out_folder import resumable_folder
+from evaluation.units.recordings import recording_name
+from evaluation.units.store import Finished, UnitStore
+from evaluation.units.unit import Unit
+from sim.presets import NOMINAL, NONE
 from tests.evaluation.regression.flights import CONDITION
 
 
+def plan(seed: int) -> SuitePlan:
+    return SuitePlan(SUITES["fast"], Setup(Config()), NOMINAL, seed)
+
+
 @pytest.fixture
-def asked(monkeypatch: pytest.MonkeyPatch) -> list[Flown]:
-    """What would have been flown."""
-    seen: list[Flown] = []
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[Unit]:
+    """What would have been measured."""
+    seen: list[Unit] = []
 
-    def outcomes(
-        function: Callable[[Flown], Outcome], tasks: Sequence[Flown], workers: int
-    ) -> Iterator[Outcome]:
-        assert function is fly
-        for task in tasks:
-            seen.append(task)
-            row = Row(task.scene, task.seed, 0, CONDITION, "run", "recorded_s", 20.0, "s")
-            yield Outcome([row], None)
+    def measure(units: Sequence[Unit], store: UnitStore, crew: Crew) -> list[Finished]:
+        seen.extend(units)
+        rows = [Row("tiny", u.seed, 0, CONDITION, "run", "recorded_s", 20.0, "s") for u in units]
+        return [Finished(ResultTable.from_rows([row]), None) for row in rows]
 
-    monkeypatch.setattr(suite, "outcomes", outcomes)
+    monkeypatch.setattr(suite, "measure", measure)
     return seen
 
 
-def test_every_flight_has_a_heap_and_a_recording_of_its_own(
-    asked: list[Flown], tmp_path: Path
-) -> None:
-    for seed in (0, 1):
-        run_suite(SUITES["fast"], Setup(Config()), "nominal", seed, tmp_path, 1)
-    heaps = {(flown.scene, flown.seed) for flown in asked}
-    recordings = {flown.recording for flown in asked}
-    assert len(heaps) == len(recordings) == len(asked)
-    assert [flown.showcase for flown in asked].count(True) == 2
+def test_every_flight_has_a_heap_and_a_recording_of_its_own() -> None:
+    flights = [flight for seed in (0, 1) for flight in plan(seed).flights()]
+    assert len({(flight.scene.name, flight.seed) for flight in flights}) == len(flights)
+    assert len({recording_name(flight) for flight in flights}) == len(flights)
+    assert len(flights) == 2 * plan(0).tasks()
 
 
-def test_rows_keep_the_order_of_the_flights(asked: list[Flown], tmp_path: Path) -> None:
-    table = run_suite(SUITES["fast"], Setup(Config()), "nominal", 3, tmp_path, 1).table
-    assert table.frame["seed"].tolist() == [flown.seed for flown in asked]
+def test_rows_keep_the_order_of_the_flights(asked: list[Unit], tmp_path: Path) -> None:
+    crew = Crew(None, 1, 1, tmp_path)
+    found = plan(3).measured(None, UnitStore(tmp_path / "units"), crew)
+    assert found.table.frame["seed"].tolist() == [flight.seed for flight in plan(3).flights()]
+    assert [unit.showcase for unit in asked] == [True] + [False] * (len(asked) - 1)
 
 
 @pytest.mark.parametrize("name", SUITES)
@@ -63,17 +67,20 @@ def test_a_suite_can_say_something_and_has_a_control(name: str) -> None:
 
 @pytest.mark.slow
 def test_a_flight_is_recorded_once_and_measured_alike(tmp_path: Path) -> None:
-    protocol = SUITES["fast"].protocol
-    flown = Flown(
-        "tiny", 0, 16.0, "none", tmp_path / "tiny", Setup(Config(), "oracle"), protocol, False
-    )
-    first = fly(flown).rows
-    made = (tmp_path / "tiny" / "recording.toml").stat().st_mtime_ns
-    again = fly(flown).rows
-    assert (tmp_path / "tiny" / "recording.toml").stat().st_mtime_ns == made
-    values = [
-        [(row.metric, row.value) for row in rows if row.stage in ("surface", "localization")]
-        for rows in (first, again)
-    ]
+    one = Suite((Flights("tiny", 1, 16.0),), Protocol(sequences=1, trials=2, sequence_length=4))
+    flown = SuitePlan(one, Setup(Config(), "oracle"), NONE, 0)
+    header = tmp_path / "recordings" / recording_name(flown.flights()[0]) / "recording.toml"
+    values, times = [], []
+    for out in ("first", "again"):
+        with (
+            resumable_folder(tmp_path / out) as folder,
+            Crew(None, 2, flown.tasks(), folder.scratch) as crew,
+        ):
+            found = flown.measured(tmp_path / "recordings", folder.store, crew)
+        frame = found.table.frame
+        kept = frame[frame["stage"].isin(["surface", "localization"])]
+        values.append(kept["value"].tolist())
+        times.append(header.stat().st_mtime_ns)
     assert values[0]
     assert repr(values[0]) == repr(values[1])
+    assert times[0] == times[1]

@@ -1,0 +1,1 @@
+"""Sweeps: what is measured when a dial is turned."""

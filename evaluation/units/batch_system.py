@@ -1,0 +1,103 @@
+"""Workers as jobs of a batch system (SLURM and its like), by Dask-jobqueue.
+
+The file is what Dask-jobqueue's own configuration is, for one system, and how many jobs to ask for:
+
+    jobs: 8
+    jobqueue:
+      slurm:
+        cores: 4
+        processes: 4
+        memory: 16GB
+        walltime: "02:00:00"
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from pathlib import Path
+from typing import Any, cast
+
+import yaml
+from distributed import SpecCluster
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from airground.errors import InputError
+
+CLASSES = {
+    "slurm": "SLURMCluster",
+    "pbs": "PBSCluster",
+    "sge": "SGECluster",
+    "lsf": "LSFCluster",
+    "oar": "OARCluster",
+    "htcondor": "HTCondorCluster",
+    "moab": "MoabCluster",
+    "local": "LocalCluster",
+}
+"""Systems that Dask-jobqueue knows; `local` runs the jobs here, to try a file out."""
+
+
+WORKERS_MAY_DRAW = "DASK_DISTRIBUTED__WORKER__DAEMON=False"
+"""Images are drawn by processes that a worker starts, which a daemon may not."""
+
+NO_DASHBOARD = {"dashboard": False, "dashboard_address": "127.0.0.1:0"}
+"""Nobody is to watch from elsewhere, and two runs want no port of the same number."""
+
+
+class Jobs(BaseModel):
+    """The file, checked; what stands under the system's name is for Dask-jobqueue to check."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    jobs: int = Field(ge=1)
+    jobqueue: dict[str, dict[str, Any]] = Field(min_length=1, max_length=1)
+
+
+def batch_cluster(file: Path) -> SpecCluster:
+    """Ask the batch system for the jobs that a file describes.
+
+    Raises:
+        InputError: The file cannot be used, Dask-jobqueue is not installed, or it refuses.
+    """
+    jobs = read_jobs(file)
+    ((system, options),) = jobs.jobqueue.items()
+    try:
+        module = importlib.import_module(f"dask_jobqueue.{system}")
+    except ImportError:
+        raise InputError(
+            f"--cluster {file}: Dask-jobqueue is not installed (pip install dask-jobqueue)"
+        ) from None
+    if options.get("cores") != options.get("processes"):
+        raise InputError(f"--cluster {file}: cores and processes must be the same number")
+    try:
+        python = f"env {WORKERS_MAY_DRAW} {options.pop('python', sys.executable)}"
+        scheduler = {**NO_DASHBOARD, **options.pop("scheduler_options", {})}
+        kind = getattr(module, CLASSES[system])
+        cluster = kind(**options, python=python, scheduler_options=scheduler)
+        cluster.scale(jobs=jobs.jobs)
+    except (TypeError, ValueError, RuntimeError, OSError) as error:
+        raise InputError(f"--cluster {file}: {system}: {error}") from None
+    return cast(SpecCluster, cluster)
+
+
+def read_jobs(file: Path) -> Jobs:
+    """Read such a file.
+
+    Raises:
+        InputError: It cannot be read, or does not say what is needed: names the entry.
+    """
+    try:
+        jobs = Jobs.model_validate(yaml.safe_load(file.read_text(encoding="utf-8")))
+    except OSError as error:
+        raise InputError(f"--cluster {file}: {error.strerror}") from None
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise InputError(f"--cluster {file}: no YAML: {error}") from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"])) or "the file"
+        raise InputError(f"--cluster {file}: {where}: {first['msg']}") from None
+    (system,) = jobs.jobqueue
+    if system not in CLASSES:
+        known = ", ".join(CLASSES)
+        raise InputError(f"--cluster {file}: unknown system {system!r}; known: {known}")
+    return jobs

@@ -1,0 +1,137 @@
+"""The unit of work: one setup measured on one flight, and the key that says what made it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from airground.errors import InputError
+from airground.io import layout
+from airground.io.digests import bytes_digest, file_digest
+from evaluation.experiment import Protocol, Task
+from evaluation.setups import Setup
+from evaluation.units.code_version import code_version
+from sim.rendered import Flight
+
+KEY_LENGTH = 32
+"""Hexadecimal digits of a key: 128 bits, so that no two units ever share one."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One setup on one flight, with all that is measured there.
+
+    Attributes:
+        recording: Where it is, or what it would be made from.
+        seed, flight: What it was made from; they seed the trials too.
+        setup: What is measured.
+        protocol: How much of it.
+        showcase: Whether to gather what pictures need.
+        budget: Whether to measure what each stage loses.
+        baselines: Whether to try the baselines.
+    """
+
+    recording: Path | Flight
+    seed: int
+    flight: int
+    setup: Setup
+    protocol: Protocol
+    showcase: bool = False
+    budget: bool = False
+    baselines: bool = False
+
+    def made_from(self) -> dict[str, Any]:
+        """Everything that its rows depend on, as JSON can hold it.
+
+        Raises:
+            InputError: The recording is not there.
+        """
+        setup = self.setup
+        return {
+            "code": code_version(),
+            "recording": _described(self.recording),
+            "seed": self.seed,
+            "flight": self.flight,
+            "config": setup.config.model_dump(mode="json"),
+            "poses": setup.poses,
+            "pose_noise": asdict(setup.noise),
+            "variant": setup.variant,
+            "protocol": asdict(self.protocol),
+            "showcase": self.showcase,
+            "budget": self.budget,
+            "baselines": self.baselines,
+        }
+
+    def key(self) -> str:
+        """A digest of `made_from`: units with the same key have the same rows."""
+        return key_of(self.made_from())
+
+    @property
+    def has_extras(self) -> bool:
+        """Whether it asks for what a task does for the first of its setups alone."""
+        return self.showcase or self.budget or self.baselines
+
+    def maps_like(self, other: Unit) -> bool:
+        """Whether one pass of mapping serves both."""
+        mine, theirs = (
+            (unit.recording, unit.seed, unit.flight, unit.protocol) for unit in (self, other)
+        )
+        return mine == theirs and self.setup.maps_like(other.setup)
+
+
+def key_of(made_from: dict[str, Any]) -> str:
+    """The digest of a description, whatever the order of its entries."""
+    text = json.dumps(made_from, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return bytes_digest(text.encode())[:KEY_LENGTH]
+
+
+def grouped(units: Iterable[Unit]) -> list[list[Unit]]:
+    """Units that share their maps, together: drawing and mapping are the expensive part.
+
+    What a task does for its first setup alone puts a unit first in a group, or apart.
+    """
+    groups: list[list[Unit]] = []
+    for unit in units:
+        for group in groups:
+            if not unit.has_extras and unit.maps_like(group[0]):
+                group.append(unit)
+                break
+        else:
+            groups.append([unit])
+    return groups
+
+
+def task_of(group: list[Unit], renderers: int) -> Task:
+    """The task that measures a group of `grouped`, images drawn by so many processes."""
+    first = group[0]
+    return Task(
+        first.recording,
+        first.seed,
+        first.flight,
+        [unit.setup for unit in group],
+        first.protocol,
+        showcase=first.showcase,
+        budget=first.budget,
+        renderers=renderers,
+        baselines=first.baselines,
+    )
+
+
+def _described(recording: Path | Flight) -> dict[str, Any]:
+    if isinstance(recording, Flight):
+        return {
+            "scene": recording.scene.model_dump(mode="json"),
+            "seed": recording.seed,
+            "flight": recording.flight,
+            "sensors": asdict(recording.sensors),
+            "duration_s": recording.duration_s,
+        }
+    # The header holds the digests of all other files.
+    header = recording / layout.HEADER
+    try:
+        return {"header": file_digest(header)}
+    except OSError as error:
+        raise InputError(f"{header}: cannot be read ({error.strerror})") from error
