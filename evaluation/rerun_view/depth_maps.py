@@ -54,7 +54,9 @@ def encoded_depth(depth: NDArray[np.float32]) -> rr.EncodedDepthImage:
     steps = np.rint(np.nan_to_num(depth, nan=0.0) / STEP_M).clip(0, np.iinfo(np.uint16).max)
     _, png = cv2.imencode(".png", steps.astype(np.uint16))
     seen = depth[np.isfinite(depth)]
-    limits = np.percentile(seen, SHOWN_PERCENTILES) if len(seen) else (0.0, 1.0)
+    near, far = np.percentile(seen, SHOWN_PERCENTILES) if len(seen) else (0.0, 1.0)
+    # Holes have the darkest colour to themselves.
+    limits = (near - (far - near) / 3, far)
     return rr.EncodedDepthImage(
         blob=png.tobytes(),
         media_type="image/png",

@@ -11,7 +11,8 @@ from evaluation.rerun_view.names import COSTS, GROUND, TRUTH
 from evaluation.rerun_view.sensor_stream import TIMELINE
 from evaluation.rerun_view.true_robots import SCENE
 
-EYE_M, TARGET_M = (-3.6, -4.6, 4.4), (1.2, 0.2, 0.4)
+EYE_M, TARGET_M = (-2.6, -3.6, 3.6), (1.2, 0.2, 0.3)
+"""Of the view, in the ground robot's map: from behind its start, over its way."""
 
 
 def layout() -> rrb.Blueprint:
@@ -19,7 +20,7 @@ def layout() -> rrb.Blueprint:
     return rrb.Blueprint(
         rrb.Vertical(
             rrb.Horizontal(
-                rrb.Vertical(_world(), _messages(), row_shares=[5, 1]),
+                rrb.Vertical(_world(), _messages(), row_shares=[9, 2]),
                 _stages(),
                 column_shares=[5, 4],
             ),
@@ -72,7 +73,7 @@ def _stages() -> rrb.Vertical:
             rrb.Spatial2DView(
                 origin="/localization/costs",
                 contents=["+ $origin/**", f"+ {TRUE_POSITION}"],
-                name="costs, particles, truth (+)",
+                name="costs, particles, truth",
                 spatial_information=rrb.SpatialInformation(target_frame=COSTS),
             ),
         ),
@@ -89,17 +90,21 @@ def _picture(entity: str, name: str) -> rrb.Spatial2DView:
 
 
 def _messages() -> rrb.TextLogView:
-    return rrb.TextLogView(origin="/events", name="what happened")
+    columns = rrb.TextLogColumns(timeline_columns=[TIMELINE], text_log_columns=["LogLevel", "Body"])
+    return rrb.TextLogView(origin="/events", name="what happened", columns=columns)
 
 
 def _curves() -> rrb.Horizontal:
     return rrb.Horizontal(
         _plot(f"{ERRORS}/translation_m", "position error [m]"),
         _plot(f"{ERRORS}/rotation_deg", "angular error [deg]"),
-        _plot("/curves/spread_m", "spread of the particles [m]"),
-        _plot("/curves/corners", "corners in the map"),
-        _plot("/curves/sigma_mm", "sigma of the position [mm]"),
+        _plot("/curves/spread_m", "particles' spread [m]"),
+        rrb.Tabs(
+            _plot("/curves/corners", "corners in the map"),
+            _plot("/curves/sigma_mm", "sigma of the position [mm]"),
+        ),
         _plot("/curves/stage_ms", "stage times [ms]"),
+        column_shares=[4, 4, 3, 4, 5],
     )
 
 

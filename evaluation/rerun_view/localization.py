@@ -24,6 +24,8 @@ SIGMAS = 2.0
 ELLIPSE_STEPS = 48
 WHITE, TRUTH_COLOUR = (255, 255, 255), (255, 60, 200)
 CROSS_PX = 7.0
+ROOM_TO_GROW = 1.3
+"""Side of all pictures of aerial height maps, in sides of the first map."""
 
 
 class Localization:
@@ -37,22 +39,41 @@ class Localization:
     def __init__(self, stream: SensorStream, truth: Truth | None) -> None:
         self._stream, self._truth = stream, truth
         self._cost_map: CostMap | None = None
-        parts = [f"{ROOM}/costs{part}" for part in ("", "/particles", "/covariance", "/estimate")]
-        stream.put_in_frame(COSTS, *parts, TRUE_POSITION)
+        self._heights: HeightMapsMade | None = None
+        self._aerial_cells: int | None = None
+        drawn = ("particles", "covariance", "estimate", "verdict")
+        parts = [f"{ROOM}/costs/{part}" for part in drawn]
+        stream.put_in_frame(COSTS, f"{ROOM}/costs", *parts, TRUE_POSITION)
 
     def see(self, seen: Seen) -> None:
         """Draw what localization was given, and what it concluded."""
         stamp_ns = seen.event.stamp_ns
         match seen.event:
-            case HeightMapsMade(aerial=aerial, ground=ground):
-                self._stream.log(stamp_ns, f"{ROOM}/aerial_heights", height_picture(aerial))
-                self._stream.log(stamp_ns, f"{ROOM}/ground_heights", height_picture(ground))
+            case HeightMapsMade():
+                self._heights = seen.event
             case CostMapComputed(cost_map=cost_map):
                 self._cost_map = cost_map
                 self._stream.log(stamp_ns, f"{ROOM}/costs", cost_picture(cost_map))
             case BeliefUpdated(belief=belief) if self._cost_map is not None:
+                self._draw_heights(stamp_ns, self._cost_map)
                 self._draw_belief(stamp_ns, belief, self._cost_map)
                 self._draw_truth(stamp_ns, seen, self._cost_map)
+
+    def _draw_heights(self, stamp_ns: int, cost_map: CostMap) -> None:
+        """The aerial map around its camera, the ground map where there are costs.
+
+        The viewer takes pictures that come under one name for a video: all have one size.
+        """
+        assert self._heights is not None
+        aerial, ground = self._heights.aerial, self._heights.ground
+        if self._aerial_cells is None:
+            self._aerial_cells = round(ROOM_TO_GROW * max(aerial.heights.shape))
+        side = self._aerial_cells
+        corner = np.full(2, -(side // 2) / aerial.cells_per_m)
+        picture = height_picture(cut_out(aerial, corner, (side, side)))
+        self._stream.log(stamp_ns, f"{ROOM}/aerial_heights", picture)
+        picture = height_picture(cut_out(ground, cost_map.origin, cost_map.costs.shape))
+        self._stream.log(stamp_ns, f"{ROOM}/ground_heights", picture)
 
     def _draw_belief(self, stamp_ns: int, belief: Belief, cost_map: CostMap) -> None:
         particles = on_costs(belief.particles[:, :2], cost_map)
@@ -62,17 +83,25 @@ class Localization:
         outline = rr.LineStrips2D(
             [ellipse], colors=[WHITE], radii=rr.Radius.ui_points(1.5), draw_order=30
         )
-        said = f"spread {belief.spread_m:.2f} m" if belief.converged else "not sure"
+        said = f"spread {belief.spread_m:.2f} m" if belief.converged else "position refused"
         estimate = rr.Points2D(
             on_costs(belief.estimate[None, :2], cost_map),
             colors=[WHITE],
             radii=rr.Radius.ui_points(1.0),
-            labels=[said],
             draw_order=31,
+        )
+        columns, rows = cost_map.costs.shape
+        verdict = rr.Points2D(
+            [[columns / 2, 0.94 * rows]],
+            colors=[WHITE],
+            radii=rr.Radius.ui_points(0.5),
+            labels=[said],
+            show_labels=True,
         )
         self._stream.log(stamp_ns, f"{ROOM}/costs/particles", green)
         self._stream.log(stamp_ns, f"{ROOM}/costs/covariance", outline)
         self._stream.log(stamp_ns, f"{ROOM}/costs/estimate", estimate)
+        self._stream.log(stamp_ns, f"{ROOM}/costs/verdict", verdict)
 
     def _draw_truth(self, stamp_ns: int, seen: Seen, cost_map: CostMap) -> None:
         if self._truth is None or seen.sighting is None:
@@ -91,9 +120,21 @@ class Localization:
 
 
 def height_picture(made: HeightMap) -> rr.EncodedImage:
-    """Heights from the lowest to the highest percent."""
-    low, high = _limits(made.heights, 1, 99)
+    """Heights, walls and other rare ones clipped."""
+    low, high = _limits(made.heights, 1, 97)
     return coloured(upright(made.heights), HEIGHT_COLOURS, low, max(high, low + 0.05))
+
+
+def cut_out(made: HeightMap, corner: NDArray, shape: tuple[int, ...]) -> HeightMap:
+    """The part of a map with `shape[0]` by `shape[1]` cells from `corner` [m]; NaN beyond it."""
+    cells = np.full(shape, np.nan, np.float32)
+    shift = np.rint((np.asarray(corner) - made.origin) * made.cells_per_m).astype(int)
+    first = np.maximum(shift, 0)
+    last = np.minimum(shift + np.array(shape), made.heights.shape)
+    if (first < last).all():
+        to, end = first - shift, last - shift
+        cells[to[0] : end[0], to[1] : end[1]] = made.heights[first[0] : last[0], first[1] : last[1]]
+    return HeightMap(cells, made.origin + shift / made.cells_per_m, made.cells_per_m)
 
 
 def cost_picture(cost_map: CostMap) -> rr.EncodedImage:
