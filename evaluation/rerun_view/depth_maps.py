@@ -8,13 +8,13 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from airground.core.events import DepthMapMade
-from airground.core.surface import DepthMap
 from evaluation.figures.style import ERROR_COLOURS
 from evaluation.onlooker import Seen
 from evaluation.rerun_view.colour_pictures import coloured
 from evaluation.rerun_view.level import Level, Pace
 from evaluation.rerun_view.names import TRUTH
 from evaluation.rerun_view.sensor_stream import SensorStream
+from evaluation.surface_error import depth_error
 from sim.truth import Truth
 
 STEP_M = 1e-3
@@ -43,10 +43,9 @@ class DepthMaps:
             case DepthMapMade(stamp_ns=stamp_ns, depth_map=made) if self._pace.due(stamp_ns):
                 self._stream.log(stamp_ns, "mav/depth_map", encoded_depth(made.depth))
                 if self._truth is not None:
-                    error = coloured(
-                        depth_error(made, self._truth), ERROR_COLOURS, -ERROR_LIMIT_M, ERROR_LIMIT_M
-                    )
-                    self._stream.log(stamp_ns, f"{TRUTH}/depth_error", error)
+                    error = depth_error(made.depth, made.camera, made.stamp_ns, self._truth)
+                    picture = coloured(error, ERROR_COLOURS, -ERROR_LIMIT_M, ERROR_LIMIT_M)
+                    self._stream.log(stamp_ns, f"{TRUTH}/depth_error", picture)
 
 
 def encoded_depth(depth: NDArray[np.float32]) -> rr.EncodedDepthImage:
@@ -64,9 +63,3 @@ def encoded_depth(depth: NDArray[np.float32]) -> rr.EncodedDepthImage:
         colormap=rr.components.Colormap.Viridis,
         depth_range=np.asarray(limits) / STEP_M,
     )
-
-
-def depth_error(made: DepthMap, truth: Truth) -> NDArray[np.float32]:
-    """(height, width) depth minus true depth [m], NaN where either is missing."""
-    true = truth.cast(made.camera, truth.T_world_mav_camera(made.stamp_ns))
-    return made.depth - true

@@ -21,6 +21,7 @@ from evaluation.rerun_view.sensor_stream import SensorStream
 
 ENTITY = "events"
 GOOD, NOTE, BAD = rr.TextLogLevel.INFO, rr.TextLogLevel.DEBUG, rr.TextLogLevel.WARN
+Said = tuple[str, rr.TextLogLevel]
 WHO = {Source.MAV: "MAV", Source.GROUND: "ground robot"}
 
 
@@ -42,7 +43,7 @@ class Messages:
             text, level = said
             self._stream.log(seen.event.stamp_ns, ENTITY, rr.TextLog(text, level=level))
 
-    def _tracking(self, seen: Seen) -> tuple[str, str] | None:
+    def _tracking(self, seen: Seen) -> Said | None:
         """How a robot gets on, where that changed."""
         kind, robot = type(seen.event), seen.frame.robot
         if kind not in (MavTracked, GroundTracked, Initializing, TrackingLost):
@@ -59,7 +60,7 @@ class Messages:
         return f"{WHO[robot]}: {again}", GOOD
 
 
-def _mapping(event: Event) -> tuple[str, str] | None:
+def _mapping(event: Event) -> Said | None:
     match event:
         case PosesCorrected(robot=robot):
             return f"{WHO[robot]}: map corrected, earlier poses moved", NOTE

@@ -69,7 +69,7 @@ def transform(T_parent_child: SE3, parent: str, child: str) -> rr.Transform3D:
     """A frame's place in another, both by name."""
     return rr.Transform3D(
         translation=T_parent_child.translation,
-        quaternion=T_parent_child.quaternion_xyzw(),
+        quaternion=rr.Quaternion(xyzw=T_parent_child.quaternion_xyzw()),
         parent_frame=parent,
         child_frame=child,
     )
