@@ -43,7 +43,9 @@ class Localization:
         self._aerial_cells: int | None = None
         drawn = ("particles", "covariance", "estimate", "verdict")
         parts = [f"{ROOM}/costs/{part}" for part in drawn]
-        stream.put_in_frame(COSTS, f"{ROOM}/costs", *parts, TRUE_POSITION)
+        stream.put_in_frame(COSTS, f"{ROOM}/costs", *parts)
+        if truth is not None:
+            stream.put_in_frame(COSTS, TRUE_POSITION)
 
     def see(self, seen: Seen) -> None:
         """Draw what localization was given, and what it concluded."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from airground.core.se3 import SE3
+
+logger = logging.getLogger(__name__)
 
 APPLICATION = "airground"
 TIMELINE = "sensor_time"
@@ -61,7 +64,11 @@ class SensorStream:
 
     def close(self) -> None:
         """Write what is still in memory, and end the file."""
-        self._stream.flush()
+        try:
+            self._stream.flush()
+        except RuntimeError as error:
+            # A viewer that was closed meanwhile; the file gets its data all the same.
+            logger.warning("the viewer is gone: %s", error)
         self._stream.disconnect()
 
 
