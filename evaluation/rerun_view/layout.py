@@ -39,7 +39,7 @@ def _world() -> rrb.Spatial3DView:
     """Both robots and their maps, in the ground robot's frame."""
     return rrb.Spatial3DView(
         origin="/",
-        name="both robots, ground map (red), newest aerial surface (orange), truth (pink)",
+        name="world: ground map red, MAV's map grey, newest surface orange, truth pink",
         contents=[
             "+ /ground/**",
             "+ /mav/**",
@@ -51,7 +51,7 @@ def _world() -> rrb.Spatial3DView:
         ],
         spatial_information=rrb.SpatialInformation(target_frame=GROUND),
         eye_controls=rrb.EyeControls3D(position=EYE_M, look_target=TARGET_M, eye_up=(0, 0, 1)),
-        line_grid=rrb.LineGrid3D(visible=True, spacing=1.0, color=(255, 255, 255, 25)),
+        line_grid=rrb.LineGrid3D(visible=False),
         overrides={SCENE: rrb.EntityBehavior(visible=False)},
     )
 

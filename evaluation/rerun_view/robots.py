@@ -80,7 +80,9 @@ class GrowingPath:
             if i < len(trajectory) and trajectory.stamps_ns[i] == stamp:
                 self._points[at] = trajectory.translations[i]
 
-    def drawn(self, colour: tuple[int, int, int]) -> rr.LineStrips3D:
+    def drawn(
+        self, colour: tuple[int, int, int], radius_m: float = PATH_RADIUS_M
+    ) -> rr.LineStrips3D:
         """As one line."""
         points = np.array(self._points, np.float32).reshape(-1, 3)
-        return rr.LineStrips3D([points], colors=[colour], radii=[PATH_RADIUS_M])
+        return rr.LineStrips3D([points], colors=[colour], radii=[radius_m])

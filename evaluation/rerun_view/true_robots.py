@@ -22,6 +22,8 @@ from evaluation.rerun_view.sensor_stream import SensorStream, transform
 from sim.truth import Truth
 
 COLOUR = (255, 60, 200)
+THIN_M = 0.004
+"""Of a true path: it lies within the estimated one, and shows where they part."""
 SCENE = f"{TRUTH}/scene"
 SCENE_COLOUR = (190, 186, 178)
 
@@ -73,7 +75,7 @@ class TrueRobots:
             placed = transform(T_world_camera, WORLD, _camera_frame(name))
             self._stream.log(stamp_ns, f"{TRUTH}/{name}/camera/pose", placed)
         if self._path_pace[robot].due(stamp_ns):
-            self._stream.log(stamp_ns, f"{TRUTH}/{name}/path", path.drawn(COLOUR))
+            self._stream.log(stamp_ns, f"{TRUTH}/{name}/path", path.drawn(COLOUR, THIN_M))
 
     def _anchor(self, stamp_ns: int, T_ground_camera: SE3) -> None:
         self._anchored = True
