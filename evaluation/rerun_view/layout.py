@@ -11,7 +11,7 @@ from evaluation.rerun_view.names import COSTS, GROUND, TRUTH
 from evaluation.rerun_view.sensor_stream import TIMELINE
 from evaluation.rerun_view.true_robots import SCENE
 
-EYE_M, TARGET_M = (-2.6, -3.6, 3.6), (1.2, 0.2, 0.3)
+EYE_M, TARGET_M = (-2.9, -3.4, 4.3), (1.3, 0.7, 0.2)
 """Of the view, in the ground robot's map: from behind its start, over its way."""
 
 
@@ -68,12 +68,12 @@ def _stages() -> rrb.Vertical:
             _picture(f"{TRUTH}/depth_error", f"its error: blue near, red far, ±{error_mm} mm"),
         ),
         rrb.Horizontal(
-            _picture("/localization/aerial_heights", "aerial height map"),
-            _picture("/localization/ground_heights", "ground height map"),
+            _picture("/localization/aerial_heights", "aerial heights"),
+            _picture("/localization/ground_heights", "ground heights"),
             rrb.Spatial2DView(
                 origin="/localization/costs",
                 contents=["+ $origin/**", f"+ {TRUE_POSITION}"],
-                name="costs, particles, truth",
+                name="costs, particles",
                 spatial_information=rrb.SpatialInformation(target_frame=COSTS),
             ),
         ),
@@ -98,7 +98,7 @@ def _curves() -> rrb.Horizontal:
     return rrb.Horizontal(
         _plot(f"{ERRORS}/translation_m", "position error [m]"),
         _plot(f"{ERRORS}/rotation_deg", "angular error [deg]"),
-        _plot("/curves/spread_m", "particles' spread [m]"),
+        _plot("/curves/spread_m", "spread [m]"),
         rrb.Tabs(
             _plot("/curves/corners", "corners in the map"),
             _plot("/curves/sigma_mm", "sigma of the position [mm]"),

@@ -94,7 +94,7 @@ class Localization:
         )
         columns, rows = cost_map.costs.shape
         verdict = rr.Points2D(
-            [[columns / 2, 0.94 * rows]],
+            [[columns / 2, 0.88 * rows]],
             colors=[WHITE],
             radii=rr.Radius.ui_points(0.5),
             labels=[said],
