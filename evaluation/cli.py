@@ -29,6 +29,8 @@ VERBS = {
     "sweep": "Turn dials, and measure what that does: curves with intervals.",
     "check": "Hold results against accepted ones: better, worse, or no difference seen.",
     "accept": "Accept results: later changes are held against them.",
+    "view": "Look into a run with rerun: in a window, in a browser, or as a file to send.",
+    "gallery": "Draw the pictures of a run as PNG files: maps, depth, costs, particles, errors.",
     "bench": "Time the pipeline's stages on this machine (Table I).",
     "doctor": "Look whether this machine can render and compute, and say what is missing.",
 }

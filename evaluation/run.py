@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,6 +28,7 @@ from airground.tracking import TrackedFrame, Trackers
 from airground.warm_up import warm_up
 from evaluation.experiment import peak_memory_mib
 from evaluation.front_ends import front_ends_for
+from evaluation.onlooker import Onlooker, Seen
 from evaluation.realtime.drops import DropList, nothing_dropped
 from evaluation.relation import pose_error
 from evaluation.results import ResultTable
@@ -59,7 +60,12 @@ class RunResult:
 
 
 def run_recording(
-    recording: Recording, truth: Truth, setup: Setup, seed: int, drops: DropList | None = None
+    recording: Recording,
+    truth: Truth,
+    setup: Setup,
+    seed: int,
+    drops: DropList | None = None,
+    onlookers: Sequence[Onlooker] = (),
 ) -> RunResult:
     """Run the pipeline of Figure 4 from the first message to the last.
 
@@ -72,11 +78,12 @@ def run_recording(
         setup: How the pipeline is set.
         seed: Of all that is random.
         drops: Which frames to do without, as a live run did.
+        onlookers: They see every event; their time counts for no stage, but for the run.
     """
     drops = drops or nothing_dropped(recording)
     watched = front_ends_for(setup, recording, truth, front_end_rng(seed))
     trackers = Trackers(recording.mav, recording.ground, watched.front_ends())
-    measure = Measure(recording, truth, setup, seed)
+    measure = Measure(recording, truth, setup, seed, onlookers)
     # Compiling is no part of what is timed.
     warm_up(setup.config, np.random.default_rng(0))
     started = time.perf_counter()
@@ -130,13 +137,21 @@ class Measure:
         truth: What is true.
         setup: How the pipeline is set.
         seed: Of all that is random.
+        onlookers: Who watches.
 
     Attributes:
         pipeline: All stages above tracking.
         out: What was measured.
     """
 
-    def __init__(self, recording: Recording, truth: Truth, setup: Setup, seed: int) -> None:
+    def __init__(
+        self,
+        recording: Recording,
+        truth: Truth,
+        setup: Setup,
+        seed: int,
+        onlookers: Sequence[Onlooker] = (),
+    ) -> None:
         self.pipeline = Pipeline(
             setup.config,
             recording.mav,
@@ -150,11 +165,14 @@ class Measure:
         self._T_ground_mav: SE3 | None = None
         self._belief: Belief | None = None
         self._sighting: Sighting | None = None
+        self._onlookers = onlookers
+        self._frame: TrackedFrame | None = None
 
     def run(self, frames: Iterable[TrackedFrame]) -> None:
         """Take in all frames, in order of time."""
-        for event, duration_ms in timed(self.pipeline.run(frames)):
+        for event, duration_ms in timed(self.pipeline.run(self._noted(frames))):
             self.take(event, duration_ms)
+            self._show(event, duration_ms)
 
     def result(self, tracked: dict[str, Tracked]) -> RunResult:
         """What the run leaves, once the front ends have finished."""
@@ -178,6 +196,16 @@ class Measure:
                 self._take_alignment(event, duration_ms)
         if type(event) in STAGE_OF and not isinstance(event, Aligned):
             self.out.add("timing", STAGE_OF[type(event)], duration_ms, "ms")
+
+    def _noted(self, frames: Iterable[TrackedFrame]) -> Iterator[TrackedFrame]:
+        for self._frame in frames:
+            yield self._frame
+
+    def _show(self, event: Event, duration_ms: float) -> None:
+        """Let onlookers see it, while no stage runs."""
+        assert self._frame is not None
+        for onlooker in self._onlookers:
+            onlooker.see(Seen(event, duration_ms, self._frame, self._sighting))
 
     def _take_belief(self, belief: Belief) -> None:
         self._belief = belief

@@ -145,7 +145,7 @@ def _splats(
     positions = (points[:, None, :] + corners).reshape(-1, 3)
     first = 4 * np.arange(len(points))[:, None, None]
     triangles = (first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
-    colours = np.repeat(_tinted(cloud.colours, tint), 4, axis=0)
+    colours = np.repeat(tinted(cloud.colours, tint), 4, axis=0)
     return _mesh(pyrender, positions, triangles, colours)
 
 
@@ -157,7 +157,7 @@ def _splat_size(points: NDArray[np.float32]) -> float:
     return float(np.clip(1.7 * np.median(spacing), 0.004, 0.05))
 
 
-def _tinted(colours: NDArray[np.uint8], tint: tuple[int, int, int] | None) -> NDArray[np.uint8]:
+def tinted(colours: NDArray[np.uint8], tint: tuple[int, int, int] | None) -> NDArray[np.uint8]:
     """Grey values, or shades of one colour that keep the brightness of the original."""
     grey = colours.astype(np.float32).mean(axis=1, keepdims=True)
     if tint is None:

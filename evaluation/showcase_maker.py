@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.augmentation import Augmentation
 from airground.config import Config
 from airground.core.belief import CostMap, HeightMap
-from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud, Source
 from airground.core.events import HeightMapsMade
 from airground.core.se3 import SE3
@@ -23,6 +21,7 @@ from evaluation.mapping_pass import Maps
 from evaluation.relation import true_T_ground_mav
 from evaluation.setups import Setup
 from evaluation.showcase import LocalizationStep, Showcase
+from evaluation.surface_error import depth_error
 from evaluation.tracking_quality import Tracked
 from evaluation.trials import SEQUENCE_LENGTH, localize_sequence, noisy_start, sequence_starts
 from sim.truth import Truth
@@ -47,16 +46,14 @@ def make_showcase(
     surface = shown.surface
     heights, steps = _localization_steps(sightings[:PANELS], truth, setup.config, seed)
     aerial_cloud, T_ground_mav = _augmented(sightings, steps[-1].belief.T_ground_mav, setup.config)
-    chosen = _spread(maps.depth_maps[first], PANELS)
+    chosen = spread_out(maps.depth_maps[first], PANELS)
     return Showcase(
         scene=recording.scene,
         condition=setup.condition(recording.sensors).label(),
         depth_maps=tuple(chosen),
-        depth_errors=tuple(_depth_error(d.depth, d.camera, d.stamp_ns, truth) for d in chosen),
+        depth_errors=tuple(depth_error(d.depth, d.camera, d.stamp_ns, truth) for d in chosen),
         surface=surface,
-        surface_error=_depth_error(
-            surface.depth, surface.camera, surface.reference_stamp_ns, truth
-        ),
+        surface_error=depth_error(surface.depth, surface.camera, surface.reference_stamp_ns, truth),
         aerial_heights=heights.aerial,
         ground_heights=heights.ground,
         aerial_reference=np.zeros(2),
@@ -64,8 +61,8 @@ def make_showcase(
         steps=tuple(steps),
         ground_cloud=sightings[-1].ground_cloud,
         aerial_cloud=aerial_cloud,
-        mav_path=_path(maps.tracked["mav"], T_ground_mav),
-        ground_path=_path(maps.tracked["ground"], SE3.identity()),
+        mav_path=path_in_ground(maps.tracked["mav"], T_ground_mav),
+        ground_path=path_in_ground(maps.tracked["ground"], SE3.identity()),
         mav_image=recording.mav_image_at(surface.reference_stamp_ns).image,
         ground_image=recording.ground_image_at(shown.ground_stamp_ns).colour,
         matched=_matched(recording, truth, maps, shown, seed) if match else None,
@@ -96,12 +93,15 @@ def _localization_steps(
             sighting = sightings[len(steps)]
             true = true_T_ground_mav(sighting, truth)
             true_u = (true @ sighting.surface.T_mav_camera.translation)[:2]
-            cost_map = _cost_map(made[-1].aerial, made[-1].ground, sighting, config)
+            cost_map = whole_cost_map(made[-1].aerial, made[-1].ground, sighting, config)
             steps.append(LocalizationStep(cost_map, iteration.belief, true_u))
     return made[0], steps
 
 
-def _cost_map(aerial: HeightMap, ground: HeightMap, sighting: Sighting, config: Config) -> CostMap:
+def whole_cost_map(
+    aerial: HeightMap, ground: HeightMap, sighting: Sighting, config: Config
+) -> CostMap:
+    """The cost of every position around the ground robot."""
     centre = sighting.T_ground_camera.translation[:2]
     local = config.localization
     if local.heading == "search":
@@ -127,19 +127,13 @@ def _augmented(
     return PointCloud(cloud.points[aerial], cloud.colours[aerial]), T_ground_mav
 
 
-def _depth_error(
-    depth: NDArray[np.float32], camera: PinholeCamera, stamp_ns: int, truth: Truth
-) -> NDArray[np.float32]:
-    """Depth minus true depth [m] of one view of the MAV, NaN where either is missing."""
-    return (depth - truth.cast(camera, truth.T_world_mav_camera(stamp_ns))).astype(np.float32)
-
-
-def _spread(depth_maps: list[DepthMap], count: int) -> list[DepthMap]:
+def spread_out(depth_maps: list[DepthMap], count: int) -> list[DepthMap]:
+    """Some of them, over their whole time."""
     chosen = np.linspace(0, len(depth_maps) - 1, min(count, len(depth_maps))).round().astype(int)
     return [depth_maps[i] for i in chosen]
 
 
-def _path(tracked: Tracked, T_ground_map: SE3) -> Trajectory:
+def path_in_ground(tracked: Tracked, T_ground_map: SE3) -> Trajectory:
     """Live poses, in `ground`."""
     poses = tracked.front_end.live_poses()
     return Trajectory.from_poses(

@@ -77,12 +77,18 @@ class Truth:
         return self.sensors(robot).camera.pinhole()
 
     @cached_property
-    def surface(self) -> o3d.t.geometry.RaycastingScene:
-        """The true surface, ready for rays and distances."""
+    def mesh(self) -> o3d.geometry.TriangleMesh:
+        """The true surface, in `world`."""
         path = self.folder / "surface.ply"
         mesh = o3d.io.read_triangle_mesh(path) if path.is_file() else None
         if mesh is None or not mesh.has_triangles():
             raise RecordingError(f"{path}: no readable mesh with triangles")
+        return mesh
+
+    @cached_property
+    def surface(self) -> o3d.t.geometry.RaycastingScene:
+        """The true surface, ready for rays and distances."""
+        mesh = self.mesh
         scene = o3d.t.geometry.RaycastingScene()
         vertices = np.asarray(mesh.vertices).astype(np.float32)
         scene.add_triangles(

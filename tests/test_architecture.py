@@ -27,6 +27,7 @@ PEERS = ("evaluation/bench/peers.py",)
 MAX_LINES = 350
 
 DISTRIBUTION_OF = {
+    "rerun_cli": "rerun-sdk",
     "OpenGL": "pyopengl",
     "PIL": "pillow",
     "cv2": "opencv-python-headless",

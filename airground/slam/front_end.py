@@ -41,6 +41,24 @@ class ScaleEstimate:
 
 
 @dataclass(frozen=True, eq=False)
+class TrackedCorners:
+    """Corners that were followed into one image.
+
+    Attributes:
+        pixels: (N, 2) float32 where they are [px].
+        mapped: (N,) whether each is in the map, so that it counts for the pose.
+    """
+
+    pixels: NDArray[np.float32]
+    mapped: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        pixels = read_only(self.pixels, "pixels", (None, 2), np.float32)
+        object.__setattr__(self, "pixels", pixels)
+        object.__setattr__(self, "mapped", read_only(self.mapped, "mapped", (len(pixels),), bool))
+
+
+@dataclass(frozen=True, eq=False)
 class TrackedPose:
     """Where the camera was when one image was taken.
 
@@ -56,6 +74,8 @@ class TrackedPose:
             [m] (Sec. VIII-B). None where the front end has no map.
         corrected: Whether the map changed with this image, and earlier poses with it:
             `FrontEnd.trajectory` has them.
+        corners: What was followed into the image, to look at; None where the front end
+            follows nothing, or is another process.
     """
 
     stamp_ns: int
@@ -65,6 +85,7 @@ class TrackedPose:
     scale: ScaleEstimate | None = None
     depth_range: tuple[float, float] | None = None
     corrected: bool = False
+    corners: TrackedCorners | None = None
 
     def __post_init__(self) -> None:
         if (self.tracking is Tracking.TRACKED) != (self.T_map_camera is not None):

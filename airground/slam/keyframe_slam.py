@@ -22,6 +22,7 @@ from airground.slam.expected_pixels import expected_pixels
 from airground.slam.feature_tracker import FeatureTracker
 from airground.slam.frame import Frame
 from airground.slam.frame_pose import frame_pose
+from airground.slam.front_end import TrackedCorners
 from airground.slam.geometry.pose_estimation import PoseFit
 from airground.slam.image_turn import ImageTurn
 from airground.slam.inertial.alignment import InertialAlignment
@@ -225,6 +226,10 @@ class KeyframeSlam:
         """
         followed = int(self.map.mapped(self.tracker.ids).sum())
         return self._adrift and followed < self.parameters.min_points
+
+    def corners(self) -> TrackedCorners:
+        """What is followed in the newest image."""
+        return TrackedCorners(self.tracker.pixels, self.map.mapped(self.tracker.ids))
 
     def depth_range(self) -> tuple[float, float] | None:
         """Nearest and farthest map point in the newest image [m]."""

@@ -82,6 +82,7 @@ class MonocularSlam:
             self._scale.estimate,
             slam.depth_range(),
             corrected,
+            slam.corners(),
         )
 
     def finish(self) -> None:

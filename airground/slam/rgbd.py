@@ -70,6 +70,7 @@ class RgbdSlam:
             covariance=slam.covariance(fit, DEPTH_SCALE_SIGMA, LEVEL_SIGMA),
             depth_range=slam.depth_range(),
             corrected=corrected,
+            corners=slam.corners(),
         )
 
     def finish(self) -> None:

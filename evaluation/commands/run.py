@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -10,25 +11,29 @@ from tyro.conf import Positional, arg
 
 from airground.errors import InputError
 from evaluation.commands.alone import AloneWords
+from evaluation.commands.look import LookWords
 from evaluation.commands.realtime import RealtimeWords
 from evaluation.commands.words import OutWord, SeedWord, SetupWords, Verb
 
 if TYPE_CHECKING:
     from airground.io.recording import Recording
+    from evaluation.onlooker import Onlooker
     from evaluation.realtime.drops import DropList
     from evaluation.run import RunResult
     from evaluation.setups import Setup
+    from sim.truth import Truth
 
 DROPPED = "dropped.json"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run(Verb, AloneWords, RealtimeWords, SetupWords, SeedWord, OutWord):
+class Run(Verb, AloneWords, RealtimeWords, LookWords, SetupWords, SeedWord, OutWord):
     """Run the pipeline over a recording and measure it against the truth.
 
     Leaves the augmented map and both robots' paths beside the measurements and the report.
     With --only it tracks one robot, and leaves its trajectory. With --realtime the recording
-    is played at its own rate, and dropped.json says which frames were too many.
+    is played at its own rate, and dropped.json says which frames were too many. With --rerun it
+    leaves run.rrd, which `airground view` opens.
     """
 
     recording: Annotated[Positional[Path], arg(metavar="RECORDING")]
@@ -37,6 +42,7 @@ class Run(Verb, AloneWords, RealtimeWords, SetupWords, SeedWord, OutWord):
     def main(self) -> None:
         self.check_alone_words()
         self.check_realtime_words(self.only)
+        self.check_look_words(self.only is not None, self.realtime)
         if self.only is not None:
             self.run_one(self.recording, self.out, self.resolved_config(), self.checked_seed())
         else:
@@ -45,10 +51,12 @@ class Run(Verb, AloneWords, RealtimeWords, SetupWords, SeedWord, OutWord):
     def _run_both(self) -> None:
         from airground.io.layout import HEADER
         from airground.io.recording import Recording
+        from evaluation.close_up import CloseUp
         from evaluation.output import fresh_folder
         from evaluation.results_folder import Results
         from evaluation.run import write_run
         from evaluation.screen import print_summary
+        from sim.truth import Truth
 
         if self.recording.is_dir() and not (self.recording / HEADER).exists():
             raise InputError(
@@ -58,23 +66,34 @@ class Run(Verb, AloneWords, RealtimeWords, SetupWords, SeedWord, OutWord):
         setup, seed = replace(self.setup(), variant=self.variant()), self.checked_seed()
         with fresh_folder(self.out) as folder:
             recording = Recording.open(self.recording)
-            result, drops = self._result(recording, setup, seed)
+            truth = Truth.open(recording.path)
+            closeup = CloseUp(recording, truth, setup) if self.looks else None
+            with self.watching(folder, recording, truth) as onlookers:
+                if closeup is not None:
+                    onlookers.append(closeup)
+                result, drops = self._result(recording, truth, setup, seed, onlookers)
             write_run(folder, recording, result)
             drops.write(folder / DROPPED)
-            summary = Results(result.table, setup.config, seed).write(folder)
+            showcase = None if closeup is None else closeup.showcase(result)
+            summary = Results(result.table, setup.config, seed, showcase).write(folder)
         print_summary(summary)
 
-    def _result(self, recording: Recording, setup: Setup, seed: int) -> tuple[RunResult, DropList]:
+    def _result(
+        self,
+        recording: Recording,
+        truth: Truth,
+        setup: Setup,
+        seed: int,
+        onlookers: Sequence[Onlooker],
+    ) -> tuple[RunResult, DropList]:
         """What the run leaves, and which frames it did without."""
         from evaluation.realtime.drops import DropList, nothing_dropped
         from evaluation.realtime.live_run import run_live
         from evaluation.run import run_recording
-        from sim.truth import Truth
 
-        truth = Truth.open(recording.path)
         if self.realtime:
             return run_live(recording, truth, setup, seed, self.playback())
         drops = nothing_dropped(recording)
         if self.drops is not None:
             drops = DropList.read(self.drops, recording)
-        return run_recording(recording, truth, setup, seed, drops), drops
+        return run_recording(recording, truth, setup, seed, drops, onlookers), drops

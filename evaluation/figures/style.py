@@ -73,10 +73,16 @@ def picture_axes(axes: Axes) -> None:
 
 
 @styled
+def save_picture(figure: Figure, folder: Path, name: str) -> None:
+    """Write `name`.png into a folder that exists; the same figure gives the same bytes."""
+    figure.savefig(folder / f"{name}.png", dpi=PICTURE_DPI, metadata={"Software": None})
+
+
+@styled
 def save_figure(figure: Figure, folder: Path, name: str) -> None:
     """Write `name`.png and `name`.pdf; the same figure gives the same bytes."""
     folder.mkdir(parents=True, exist_ok=True)
-    figure.savefig(folder / f"{name}.png", dpi=PICTURE_DPI, metadata={"Software": None})
+    save_picture(figure, folder, name)
     # The layout is found; finding it again costs as much as drawing.
     figure.set_layout_engine("none")
     figure.savefig(

@@ -1,0 +1,38 @@
+"""`airground gallery`: the pictures of a run, without a screen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from airground.errors import InputError
+from evaluation.commands.words import OutWord, Verb
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gallery(Verb, OutWord):
+    """Draw the pictures of a run as PNG files: maps, depth, costs, particles, errors.
+
+    They are those of the report, drawn from what run --rerun or reproduce has kept.
+    """
+
+    run: Annotated[Positional[Path], arg(metavar="RUN")]
+    """A folder that run --rerun or reproduce has written."""
+
+    def main(self) -> None:
+        from evaluation.figures.style import save_picture
+        from evaluation.output import fresh_folder
+        from evaluation.report_figures import report_figures
+        from evaluation.results_folder import read_results
+
+        results = read_results(self.run)
+        if results.showcase is None:
+            raise InputError(f"{self.run}: keeps no pictures; run the recording again with --rerun")
+        with fresh_folder(self.out) as folder:
+            table = results.table
+            for drawn in report_figures(table, table.conditions(), results.showcase):
+                save_picture(drawn.figure, folder, drawn.name)
+                print(f"{drawn.name}.png: {drawn.title}")

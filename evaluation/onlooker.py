@@ -1,0 +1,36 @@
+"""Who may watch a run as it happens: drawing a run must change nothing in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from airground.core.events import Event
+from airground.pipeline import Sighting
+from airground.tracking import TrackedFrame
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """One event, and what it came from.
+
+    Attributes:
+        event: What happened.
+        duration_ms: How long it took; of an event that says how an image was tracked, with
+            decoding.
+        frame: The newest image that was tracked, with its pose.
+        sighting: The newest aerial surface, with what both robots knew then; None before the
+            first, and while a robot is lost.
+    """
+
+    event: Event
+    duration_ms: float
+    frame: TrackedFrame
+    sighting: Sighting | None
+
+
+class Onlooker(Protocol):
+    """Watches a run."""
+
+    def see(self, seen: Seen) -> None:
+        """Take in one event; called in the order in which they happen."""

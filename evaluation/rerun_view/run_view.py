@@ -1,0 +1,68 @@
+"""All that is drawn of a run, from its events."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from airground.core.cloud import Source
+from airground.io.recording import Recording
+from evaluation.onlooker import Onlooker, Seen
+from evaluation.rerun_view.curves import Curves
+from evaluation.rerun_view.depth_maps import DepthMaps
+from evaluation.rerun_view.images import Images
+from evaluation.rerun_view.layout import layout
+from evaluation.rerun_view.level import LEVELS, LevelName
+from evaluation.rerun_view.localization import Localization
+from evaluation.rerun_view.maps import Maps
+from evaluation.rerun_view.messages import Messages
+from evaluation.rerun_view.robots import Robots
+from evaluation.rerun_view.sensor_stream import SensorStream
+from evaluation.rerun_view.true_robots import TrueRobots
+from sim.truth import Truth
+
+RUN_FILE = "run.rrd"
+
+
+class RunView:
+    """An onlooker that writes a run for the viewer.
+
+    Args:
+        path: The .rrd file to write.
+        recording: What is run; its calibrations shape the frustums.
+        truth: What is true; None leaves out errors and all else under `/truth`.
+        level: How much is kept.
+        viewer: Address of a viewer that listens; None for none.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        recording: Recording,
+        truth: Truth | None,
+        level: LevelName = "stages",
+        viewer: str | None = None,
+    ) -> None:
+        chosen = LEVELS[level]
+        calibrations = {Source.MAV: recording.mav, Source.GROUND: recording.ground}
+        self._stream = stream = SensorStream(path, recording.path.name, layout(), viewer)
+        self._parts: Sequence[Onlooker] = (
+            Robots(stream, chosen),
+            Images(stream, chosen, calibrations),
+            DepthMaps(stream, chosen, truth),
+            Maps(stream, chosen, recording.ground.camera),
+            Localization(stream, truth),
+            Curves(stream, chosen, truth),
+            Messages(stream),
+        )
+        if truth is not None:
+            self._parts = (*self._parts, TrueRobots(stream, chosen, truth, calibrations))
+
+    def see(self, seen: Seen) -> None:
+        """Draw one event."""
+        for part in self._parts:
+            part.see(seen)
+
+    def close(self) -> None:
+        """End the file."""
+        self._stream.close()

@@ -1,0 +1,199 @@
+"""Rerun's own programs: its viewer on this screen or in a browser, on loopback only.
+
+What the SDK serves listens on every interface and cannot be told otherwise; rerun's program
+can (`--bind`). So that program serves, and nothing here calls `serve_grpc`,
+`serve_web_viewer` or `spawn`.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from urllib.parse import quote
+
+import rerun_cli
+
+from airground.errors import AirgroundError, InputError
+
+LOOPBACK = "127.0.0.1"
+START_S = 30.0
+"""A viewer that does not listen by then will not."""
+STOP_S = 5.0
+
+
+@dataclass(frozen=True)
+class Ports:
+    """Where a viewer listens.
+
+    Attributes:
+        data: For what it shows (gRPC).
+        web: For the page of the web viewer.
+    """
+
+    data: int
+    web: int
+
+    @property
+    def sink(self) -> str:
+        """Where a running pipeline sends what it draws."""
+        return f"rerun+http://{LOOPBACK}:{self.data}/proxy"
+
+    @property
+    def page(self) -> str:
+        """What to open in a browser."""
+        source = quote(f"rerun+http://localhost:{self.data}/proxy", safe="")
+        return f"http://localhost:{self.web}/?url={source}"
+
+
+def program() -> Path:
+    """Rerun's program, which comes with its SDK.
+
+    Raises:
+        AirgroundError: The installation lacks it.
+    """
+    path = Path(os.environ.get("RERUN_CLI_PATH", Path(rerun_cli.__file__).with_name("rerun")))
+    if not path.is_file():
+        raise AirgroundError(f"{path}: rerun's program is missing; install rerun-sdk again")
+    return path
+
+
+def has_screen() -> bool:
+    """Whether a window can be opened."""
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def show(file: Path) -> int:
+    """Open a file in a window; returns the exit code once that is closed."""
+    with _running(str(file), *_listening(free_ports())) as viewer:
+        return viewer.wait()
+
+
+@contextmanager
+def serving(ports: Ports, file: Path | None = None) -> Iterator[subprocess.Popen[bytes]]:
+    """Serve the web viewer with a file, or with what a pipeline sends, while the block runs.
+
+    Raises:
+        AirgroundError: It does not start.
+    """
+    shown = () if file is None else (str(file),)
+    web = ("--serve-web", "--web-viewer-port", str(ports.web))
+    with _running(*shown, *web, *_listening(ports)) as server:
+        _wait_until_open(server, ports.data)
+        _wait_until_open(server, ports.web)
+        yield server
+
+
+@contextmanager
+def window(ports: Ports, *options: str) -> Iterator[subprocess.Popen[bytes]]:
+    """A viewer that waits for what a pipeline sends, and stays open after the block.
+
+    Raises:
+        AirgroundError: It does not start.
+    """
+    viewer = _start(*options, "--expect-data-soon", *_listening(ports))
+    try:
+        _wait_until_open(viewer, ports.data)
+        yield viewer
+    except BaseException:
+        _stop(viewer)
+        raise
+
+
+def save(file: Path, out: Path) -> None:
+    """Copy a file with its layout, its pieces joined to play smoothly.
+
+    Raises:
+        InputError: `file` is none of rerun's, or `out` exists or cannot be written.
+    """
+    if out.exists():
+        raise InputError(f"--save {out}: exists already; name a new file, or remove this one")
+    if not out.parent.is_dir():
+        raise InputError(f"--save {out}: there is no folder {out.parent}")
+    partial = out.with_name(f".{out.name}.partial")
+    try:
+        _carry_out("rrd", "optimize", str(file), "-o", str(partial))
+        verify(partial)
+        partial.rename(out)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def verify(file: Path) -> None:
+    """Let rerun check a file.
+
+    Raises:
+        InputError: It does not pass.
+    """
+    _carry_out("rrd", "verify", str(file))
+
+
+def free_ports() -> Ports:
+    """Rerun's usual ports, or others where those are taken."""
+    data = _free_port(9876)
+    return Ports(data, _free_port(9090))
+
+
+def _free_port(wanted: int) -> int:
+    for port in (wanted, 0):
+        with socket.socket() as probe:
+            try:
+                probe.bind((LOOPBACK, port))
+            except OSError:
+                continue
+            return int(probe.getsockname()[1])
+    raise AirgroundError("no free port on loopback")
+
+
+def _listening(ports: Ports) -> tuple[str, ...]:
+    return "--bind", LOOPBACK, "--port", str(ports.data)
+
+
+@contextmanager
+def _running(*words: str) -> Iterator[subprocess.Popen[bytes]]:
+    process = _start(*words)
+    try:
+        yield process
+    finally:
+        _stop(process)
+
+
+def _start(*words: str) -> subprocess.Popen[bytes]:
+    # Its log would lie over ours; what goes wrong shows in its exit code.
+    return subprocess.Popen(
+        [str(program()), *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+
+
+def _stop(process: subprocess.Popen[bytes]) -> None:
+    process.terminate()
+    try:
+        process.wait(STOP_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def _wait_until_open(process: subprocess.Popen[bytes], port: int) -> None:
+    until = time.monotonic() + START_S
+    while time.monotonic() < until:
+        if process.poll() is not None:
+            raise AirgroundError(f"rerun's viewer ended at once, with exit code {process.poll()}")
+        with socket.socket() as probe:
+            if probe.connect_ex((LOOPBACK, port)) == 0:
+                return
+        time.sleep(0.05)
+    raise AirgroundError(f"rerun's viewer does not listen on port {port} after {START_S:.0f} s")
+
+
+def _carry_out(*words: str) -> None:
+    done = subprocess.run([str(program()), *words], capture_output=True, text=True, check=False)
+    if done.returncode:
+        lines = (done.stderr or done.stdout).strip().splitlines()
+        reason = lines[-1] if lines else f"exit code {done.returncode}"
+        raise InputError(f"rerun {' '.join(words[:2])} {words[2]}: {reason}")
