@@ -39,7 +39,10 @@ def metric_depth(units: NDArray[np.uint16], units_per_m: float) -> NDArray[np.fl
 
 def image_size(path: Path) -> tuple[int, int]:
     """Width and height [px], from the file's first bytes; raises RecordingError."""
-    data = _bytes(path)
+    return _size(path, _bytes(path))
+
+
+def _size(path: Path, data: bytes) -> tuple[int, int]:
     if len(data) < 24:
         raise RecordingError(f"{path}: is truncated: the PNG image has no size")
     return int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
@@ -60,14 +63,15 @@ def _read(path: Path, shape: tuple[int, ...], dtype: type[np.generic]) -> NDArra
     data = _bytes(path)
     if not data.endswith(_PNG_END):
         raise RecordingError(f"{path}: is truncated: the PNG image has no end")
+    width, height = _size(path, data)
+    # Before it is decoded: a few bytes may claim an image that fills the memory.
+    if (height, width) != shape[:2]:
+        raise RecordingError(
+            f"{path}: is {width}x{height}, the calibration says {shape[1]}x{shape[0]}"
+        )
     image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None:
         raise RecordingError(f"{path}: is damaged: the PNG image cannot be decoded")
-    if image.shape[:2] != shape[:2]:
-        raise RecordingError(
-            f"{path}: is {image.shape[1]}x{image.shape[0]}, "
-            f"the calibration says {shape[1]}x{shape[0]}"
-        )
     if image.ndim != len(shape) or image.dtype != dtype:
         channels = 1 if image.ndim == 2 else image.shape[2]
         raise RecordingError(

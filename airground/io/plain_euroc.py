@@ -20,6 +20,7 @@ from airground.errors import RecordingError
 from airground.io.euroc import read_image_list, read_magnetic
 from airground.io.images import read_grey
 from airground.io.lens import Undistortion
+from airground.io.listed_files import listed_files
 from airground.io.plain_inertial import read_inertial
 from airground.io.plausibility import CAMERA_STEP_S, check_stamp_unit, level_body
 from airground.io.robot_recording import RobotRecording
@@ -53,7 +54,7 @@ def open_euroc(path: Path, calibration_file: Path | None = None) -> RobotRecordi
     undistortion = Undistortion(lens)
     stamps, names = read_image_list(camera_list)
     check_stamp_unit(stamps, camera_list, "nanoseconds", CAMERA_STEP_S)
-    files = [camera / "data" / name for name in names]
+    files = listed_files(camera / "data", names, camera_list)
     missing = next((file for file in files if not file.is_file()), None)
     if missing is not None:
         raise RecordingError(f"{missing}: this image is listed in {camera_list.name} but missing")

@@ -27,6 +27,7 @@ from airground.io.associate import associate
 from airground.io.euroc import read_lines, read_magnetic
 from airground.io.images import image_size, read_colour, read_depth
 from airground.io.lens import Lens, Undistortion
+from airground.io.listed_files import listed_files
 from airground.io.plain_inertial import Inertial, read_inertial
 from airground.io.plausibility import CAMERA_STEP_S, check_stamp_unit, level_body
 from airground.io.robot_recording import RobotRecording
@@ -87,9 +88,9 @@ def open_tum(path: Path, robot: Source, calibration_file: Path | None = None) ->
             "rgb.txt; both must be stamped by the same clock"
         )
     stamps = colour_stamps[colour]
-    files = [
-        (path / colour_names[c], path / depth_names[d]) for c, d in zip(colour, depth, strict=True)
-    ]
+    colour_files = listed_files(path, colour_names, path / "rgb.txt")
+    depth_files = listed_files(path, depth_names, path / "depth.txt")
+    files = [(colour_files[c], depth_files[d]) for c, d in zip(colour, depth, strict=True)]
     missing = next((file for pair in files for file in pair if not file.is_file()), None)
     if missing is not None:
         raise RecordingError(f"{missing}: this image is listed but missing")
