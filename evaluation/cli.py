@@ -28,6 +28,7 @@ VERBS = {
     "reproduce": "Do all of it: the paper's protocol, from scenes to report.",
     "check": "Hold results against accepted ones: better, worse, or no difference seen.",
     "accept": "Accept results: later changes are held against them.",
+    "inspect": "Say what is in a dataset, and what is wrong with it.",
     "export": "Write a recording in a format that other tools read.",
     "bench": "Time the pipeline's stages on this machine (Table I).",
     "doctor": "Look whether this machine can render and compute, and say what is missing.",
