@@ -32,7 +32,7 @@ from airground.core.se3 import SE3
 from airground.core.surface import AerialSurface
 from airground.core.trajectory import Trajectory
 from airground.dense.reconstruction import DenseReconstruction
-from airground.ground_map import GroundMap
+from airground.ground_map import FixedMap, GroundMap
 from airground.localization.particle_filter import MonteCarloLocalizer
 from airground.refinement import refine
 from airground.slam.front_end import TrackedPose, Tracking
@@ -51,7 +51,7 @@ class Mapping:
         self._dense = DenseReconstruction(mav.camera, config)
         self._north: dict[Source, float | None] = {Source.MAV: None, Source.GROUND: None}
         self._correction: Trajectory | None = None
-        self.ground_map = GroundMap(ground.camera, config.ground_mapping)
+        self.ground_map: GroundMap | FixedMap = GroundMap(ground.camera, config.ground_mapping)
         self.mav_pose: TrackedPose | None = None
         self.ground_pose: TrackedPose | None = None
 

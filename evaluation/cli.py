@@ -31,6 +31,8 @@ VERBS = {
     "accept": "Accept results: later changes are held against them.",
     "view": "Look into a run with rerun: in a window, in a browser, or as a file to send.",
     "gallery": "Draw the pictures of a run as PNG files: maps, depth, costs, particles, errors.",
+    "inspect": "Say what is in a dataset, and what is wrong with it.",
+    "export": "Write a recording in a format that other tools read.",
     "bench": "Time the pipeline's stages on this machine (Table I).",
     "doctor": "Look whether this machine can render and compute, and say what is missing.",
 }

@@ -52,7 +52,7 @@ class WatchedFrontEnds:
 def front_ends_for(
     setup: Setup, recording: Recording, truth: Truth, rng: np.random.Generator
 ) -> WatchedFrontEnds:
-    """The front ends of a setup: SLAM, or an oracle, for each robot.
+    """The front ends of a setup: SLAM, an oracle, or a file, for each robot.
 
     Args:
         setup: Says which.
@@ -69,4 +69,11 @@ def front_ends_for(
         ground = make_front_end(
             GROUND, "slam", Ingredients(recording.ground, setup.config, ground_rng)
         )
+    given = setup.given
+    if given.mav is not None:
+        brought = Ingredients(recording.mav, setup.config, mav_rng, given.mav)
+        mav = make_front_end(MAV, "file", brought)
+    if given.ground is not None:
+        brought = Ingredients(recording.ground, setup.config, ground_rng, given.ground)
+        ground = make_front_end(GROUND, "file", brought)
     return WatchedFrontEnds(WatchedFrontEnd(mav), WatchedFrontEnd(ground), slam)

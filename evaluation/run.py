@@ -104,6 +104,11 @@ def front_end_rng(seed: int) -> np.random.Generator:
     return np.random.default_rng(seed).spawn(2)[0]
 
 
+def pipeline_rng(seed: int) -> np.random.Generator:
+    """Draws what the stages above tracking need."""
+    return np.random.default_rng(seed).spawn(2)[1]
+
+
 def write_run(folder: Path, recording: Recording, result: RunResult) -> None:
     """Write `augmented_map.ply` and the robots' trajectories."""
     augmented = result.augmented
@@ -156,8 +161,9 @@ class Measure:
             setup.config,
             recording.mav,
             recording.ground,
-            np.random.default_rng(seed).spawn(2)[1],
+            pipeline_rng(seed),
         )
+        setup.given.enter(self.pipeline)
         condition = setup.condition(recording.sensors)
         self.out = RowWriter(recording.scene, recording.seed, recording.flight, condition)
         self._truth = truth

@@ -91,7 +91,7 @@ def write_alone(
     """
     for name, path in (("trajectory", result.final), ("trajectory_live", result.live)):
         if path is not None:
-            write_tum(folder / f"{name}.tum", _of_pose_frame(path, recording.T_pose_camera))
+            write_tum(folder / f"{name}.tum", of_pose_frame(path, recording.T_pose_camera))
     summary = {
         "schema": "airground-alone",
         "version": 1,
@@ -110,8 +110,8 @@ def write_alone(
         },
         "finish_ms": result.finish_ms,
         "error": {
-            "final": _error(result.final, true_pose),
-            "live": _error(result.live, true_pose),
+            "final": error_against(true_pose, result.final),
+            "live": error_against(true_pose, result.live),
         },
     }
     text = json.dumps(summary, indent=2) + "\n"
@@ -157,14 +157,15 @@ def _live(tracked: list[TrackedPose]) -> Trajectory | None:
     return Trajectory.from_poses(list(stamps), list(cameras))
 
 
-def _of_pose_frame(cameras: Trajectory, T_pose_camera: SE3) -> Trajectory:
+def of_pose_frame(cameras: Trajectory, T_pose_camera: SE3) -> Trajectory:
+    """Poses of the frame whose truth the publisher states, from those of the camera."""
     T_camera_pose = T_pose_camera.inverse()
     poses = [cameras[index] @ T_camera_pose for index in range(len(cameras))]
     return Trajectory.from_poses(cameras.stamps_ns.tolist(), poses)
 
 
-def _error(
-    cameras: Trajectory | None, true_pose: Callable[[int], SE3 | None] | None
+def error_against(
+    true_pose: Callable[[int], SE3 | None] | None, cameras: Trajectory | None
 ) -> dict[str, float] | None:
     """Absolute trajectory error over the images whose true pose is known."""
     if cameras is None or true_pose is None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from airground.config import Config, paper
+from evaluation.given import NOTHING, Given
 from evaluation.oracle import EXACT, PoseNoise
 from evaluation.results import Condition
 
@@ -24,17 +25,19 @@ class Setup:
         poses: Where the cameras' poses come from.
         noise: What was added to the oracle's poses.
         variant: What else differs from the preset, in words.
+        given: What the user brings along in place of a stage.
     """
 
     config: Config
     poses: Poses = "slam"
     noise: PoseNoise = EXACT
     variant: str = ""
+    given: Given = NOTHING
 
     def slam_robots(self) -> frozenset[str]:
         """Those of "mav" and "ground" whose poses come from SLAM."""
         without = {"oracle": ROBOTS, "slam, exact mav": {"mav"}, "slam, exact ground": {"ground"}}
-        return frozenset(ROBOTS - without.get(self.poses, set()))
+        return frozenset(ROBOTS - without.get(self.poses, set()) - self.given.robots())
 
     def condition(self, sensors: str) -> Condition:
         """How results name this setup."""

@@ -68,10 +68,10 @@ def read_euroc_poses(path: Path) -> Trajectory:
         stamps = np.array([int(fields[0]) for fields in lines], np.int64)
         values = np.array([fields[1:EUROC_COLUMNS] for fields in lines], np.float64)
         values = values.reshape(-1, EUROC_COLUMNS - 1)
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         raise RecordingError(f"{path}: expected stamp, x, y, z, qw, qx, qy, qz: {error}") from None
     quaternions = values[:, 3:]
-    off = np.abs(np.linalg.norm(quaternions, axis=1) - 1) > UNIT_TOLERANCE
+    off = ~(np.abs(np.linalg.norm(quaternions, axis=1) - 1) <= UNIT_TOLERANCE)  # or NaN
     if off.any():
         raise RecordingError(
             f"{path}: the quaternion (qw qx qy qz) at stamp {stamps[np.argmax(off)]} must have "

@@ -18,6 +18,8 @@ from airground.core.se3 import SE3
 Positive = Annotated[float, Field(gt=0)]
 Row = tuple[float, float, float, float]
 ROTATION_TOLERANCE = 1e-6
+MAX_SIDE_PX = 8192
+"""No camera here has more; images are decoded and undistorted whole."""
 
 
 class Table(BaseModel):
@@ -48,8 +50,8 @@ def pose_rows(pose: SE3) -> Pose:
 class CameraTable(Table):
     """A pinhole camera; integer pixel coordinates are pixel centres."""
 
-    width: Annotated[int, Field(ge=1)]
-    height: Annotated[int, Field(ge=1)]
+    width: Annotated[int, Field(ge=1, le=MAX_SIDE_PX)]
+    height: Annotated[int, Field(ge=1, le=MAX_SIDE_PX)]
     fx: Positive
     fy: Positive
     cx: float

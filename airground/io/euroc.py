@@ -58,8 +58,8 @@ def read_image_list(path: Path) -> tuple[NDArray[np.int64], list[str]]:
         _check_whole_stamp(line, number, path)
         try:
             stamp, name = line.split(",")
-            stamps.append(int(stamp))
-        except ValueError:
+            stamps.append(np.int64(int(stamp)))
+        except (ValueError, OverflowError):
             raise RecordingError(
                 f"{path}:{number}: expected 'timestamp [ns],filename', got '{line[:60]}'"
             ) from None
@@ -105,7 +105,7 @@ def _read_samples(path: Path, columns: int) -> tuple[NDArray[np.int64], NDArray[
     dtype = np.dtype([("stamp", np.int64), ("values", np.float64, (columns,))])
     try:
         table = np.loadtxt(path, dtype=dtype, delimiter=",", comments="#", ndmin=1)
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         raise RecordingError(
             f"{path}: expected 'timestamp [ns]' and {columns} numbers a line: {error}"
         ) from None

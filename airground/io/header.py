@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import reprlib
 import tomllib
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -15,6 +16,8 @@ from airground.io.calibration import CalibrationTable, Table
 
 SCHEMA = 1
 _NUMBERS = re.compile(r"\[\s+([-+.\deE,\s]+?)\s+\]")  # an array of numbers over many lines
+_SHORT = reprlib.Repr()
+_SHORT.maxlevel, _SHORT.maxlist, _SHORT.maxstring, _SHORT.maxother = 2, 16, 60, 60
 
 
 class FrameCounts(Table):
@@ -71,8 +74,10 @@ def read_toml(path: Path) -> dict[str, Any]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise RecordingError(f"{path}: no such file; is this a recording?") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, ValueError) as error:
         raise RecordingError(f"{path}: cannot be read as TOML: {error}") from None
+    except RecursionError:
+        raise RecordingError(f"{path}: cannot be read as TOML: nested too deep") from None
 
 
 def write_toml(path: Path, table: Table) -> None:
@@ -98,10 +103,10 @@ def parse_table(kind: type[AnyTable], values: dict[str, Any], path: Path) -> Any
             raise RecordingError(f"{path}: key '{key}' is missing") from None
         message = first["msg"].removeprefix("Value error, ")
         raise RecordingError(
-            f"{path}: key '{key}': {message}, got {_short(first['input'])}"
+            f"{path}: key '{key}': {message}, got {shortened(first['input'])}"
         ) from None
 
 
-def _short(value: object, length: int = 60) -> str:
-    text = repr(value)
-    return text if len(text) <= length else text[: length - 3] + "..."
+def shortened(value: object) -> str:
+    """What a file held, short enough for one line however much it was."""
+    return _SHORT.repr(value)

@@ -12,26 +12,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.core.cloud import Source
-from airground.core.messages import ImuNoise, ImuSamples, MavImage, RobotCalibration
+from airground.core.messages import MavImage, RobotCalibration
 from airground.core.se3 import SE3
 from airground.errors import RecordingError
-from airground.io.euroc import read_image_list, read_imu, read_magnetic
+from airground.io.euroc import read_image_list, read_magnetic
 from airground.io.images import read_grey
 from airground.io.lens import Undistortion
-from airground.io.plausibility import (
-    CAMERA_STEP_S,
-    IMU_STEP_S,
-    check_imu_covers,
-    check_stamp_unit,
-    check_up_in_camera,
-    level_body,
-    upwards,
-)
+from airground.io.listed_files import listed_files
+from airground.io.plain_inertial import read_inertial
+from airground.io.plausibility import CAMERA_STEP_S, check_stamp_unit, level_body
 from airground.io.robot_recording import RobotRecording
-from airground.io.sensor_file import read_imu_noise, read_lens, read_pose
+from airground.io.sensor_file import read_lens, read_pose
 
 UP_LEVEL_CAMERA = np.array([0.0, -1.0, 0.0])
 """What is up in a camera that looks straight ahead; assumed where nothing measures it."""
@@ -61,12 +54,16 @@ def open_euroc(path: Path, calibration_file: Path | None = None) -> RobotRecordi
     undistortion = Undistortion(lens)
     stamps, names = read_image_list(camera_list)
     check_stamp_unit(stamps, camera_list, "nanoseconds", CAMERA_STEP_S)
-    files = [camera / "data" / name for name in names]
+    files = listed_files(camera / "data", names, camera_list)
     missing = next((file for file in files if not file.is_file()), None)
     if missing is not None:
         raise RecordingError(f"{missing}: this image is listed in {camera_list.name} but missing")
     T_body_camera = read_pose(camera / "sensor.yaml")
-    imu, noise, T_imu_camera, up_imu = _inertial(folder, T_body_camera, stamps)
+    inertial = None
+    if (folder / "imu0").exists():
+        inertial = read_inertial(folder / "imu0", T_body_camera, stamps)
+    T_imu_camera = inertial.T_imu_camera if inertial else SE3.identity()
+    up_imu = inertial.up_imu if inertial else UP_LEVEL_CAMERA
     magnetic_file = folder / "mag0" / "data.csv"
 
     def read_image(index: int) -> MavImage:
@@ -79,28 +76,15 @@ def open_euroc(path: Path, calibration_file: Path | None = None) -> RobotRecordi
         layout="euroc",
         robot=Source.MAV,
         calibration=RobotCalibration(
-            undistortion.camera, T_imu_camera, level_body(up_imu, T_imu_camera), noise
+            undistortion.camera,
+            T_imu_camera,
+            level_body(up_imu, T_imu_camera),
+            inertial.noise if inertial else None,
         ),
         camera_stamps=stamps,
-        imu=imu,
+        imu=inertial.samples if inertial else None,
         magnetic=read_magnetic(magnetic_file) if magnetic_file.exists() else None,
         read_image=read_image,
         pose_frame="body",
         T_pose_camera=T_body_camera,
     )
-
-
-def _inertial(
-    folder: Path, T_body_camera: SE3, camera_stamps: NDArray[np.int64]
-) -> tuple[ImuSamples | None, ImuNoise | None, SE3, NDArray[np.float64]]:
-    """Samples, noise, T_imu_camera and what is up in the IMU; without one, in the camera."""
-    imu_file, sensor_file = folder / "imu0" / "data.csv", folder / "imu0" / "sensor.yaml"
-    if not imu_file.parent.exists():
-        return None, None, SE3.identity(), UP_LEVEL_CAMERA
-    T_imu_camera = read_pose(sensor_file).inverse() @ T_body_camera
-    imu = read_imu(imu_file)
-    check_stamp_unit(imu.stamps_ns, imu_file, "nanoseconds", IMU_STEP_S)
-    check_imu_covers(imu, imu_file, camera_stamps)
-    up_imu = upwards(imu, imu_file)
-    check_up_in_camera(T_imu_camera.rotation.T @ up_imu, imu_file)
-    return imu, read_imu_noise(sensor_file), T_imu_camera, up_imu

@@ -3,10 +3,11 @@
     rgb.txt  rgb/*.png        colour, 8 bit
     depth.txt  depth/*.png    16 bit, 5000 a metre, 0 is missing, registered to the colour
     accelerometer.txt         of a Kinect; may be missing
+    imu0/{sensor.yaml,data.csv} mag0/data.csv    in EuRoC's form; TUM's own have none
 
 No calibration is shipped: it is the published one of the Kinect that the folder's name
-tells, or comes from a file. There is no gyro, so these recordings have no IMU; the
-accelerometer only says what is up as the recording starts.
+tells, or comes from a file. Without a gyro a recording has no IMU; the accelerometer then
+only says what is up as the recording starts.
 """
 
 from __future__ import annotations
@@ -23,12 +24,14 @@ from airground.core.messages import GroundImage, MavImage, RobotCalibration
 from airground.core.se3 import SE3
 from airground.errors import RecordingError
 from airground.io.associate import associate
-from airground.io.euroc import read_lines
+from airground.io.euroc import read_lines, read_magnetic
 from airground.io.images import image_size, read_colour, read_depth
 from airground.io.lens import Lens, Undistortion
+from airground.io.listed_files import listed_files
+from airground.io.plain_inertial import Inertial, read_inertial
 from airground.io.plausibility import CAMERA_STEP_S, check_stamp_unit, level_body
 from airground.io.robot_recording import RobotRecording
-from airground.io.sensor_file import read_lens
+from airground.io.sensor_file import read_lens, read_pose
 from airground.io.tum import parse_stamp, read_image_list
 
 DEPTH_UNITS_PER_M = 5000.0
@@ -66,14 +69,15 @@ def open_tum(path: Path, robot: Source, calibration_file: Path | None = None) ->
 
     Args:
         path: The folder with `rgb.txt`.
-        robot: Whom to take it for. The MAV's images are grey and without depth, and with no
-            gyro either the scale of its map is unknown.
+        robot: Whom to take it for. The MAV's images are grey and without depth; where there
+            is no gyro either, the scale of its map is unknown.
         calibration_file: Of the colour camera, in the form of EuRoC's `sensor.yaml`.
 
     Raises:
         RecordingError: One line that names file, key or stamp and what would be right.
     """
-    lens = _lens(path, calibration_file)
+    calibration_file = _calibration_file(path, calibration_file)
+    lens = _published_lens(path) if calibration_file is None else read_lens(calibration_file)
     undistortion = Undistortion(lens)
     colour_stamps, colour_names = _image_list(path / "rgb.txt")
     depth_stamps, depth_names = _image_list(path / "depth.txt")
@@ -84,9 +88,9 @@ def open_tum(path: Path, robot: Source, calibration_file: Path | None = None) ->
             "rgb.txt; both must be stamped by the same clock"
         )
     stamps = colour_stamps[colour]
-    files = [
-        (path / colour_names[c], path / depth_names[d]) for c, d in zip(colour, depth, strict=True)
-    ]
+    colour_files = listed_files(path, colour_names, path / "rgb.txt")
+    depth_files = listed_files(path, depth_names, path / "depth.txt")
+    files = [(colour_files[c], depth_files[d]) for c, d in zip(colour, depth, strict=True)]
     missing = next((file for pair in files for file in pair if not file.is_file()), None)
     if missing is not None:
         raise RecordingError(f"{missing}: this image is listed but missing")
@@ -106,27 +110,50 @@ def open_tum(path: Path, robot: Source, calibration_file: Path | None = None) ->
         )
 
     read_image(0)
-    level = level_body(_up_at_start(path, int(stamps[0])), SE3.identity())
+    inertial = _inertial(path, calibration_file, stamps)
+    T_imu_camera = inertial.T_imu_camera if inertial else SE3.identity()
+    up_imu = inertial.up_imu if inertial else _up_at_start(path, int(stamps[0]))
+    magnetic_file = path / "mag0" / "data.csv"
     return RobotRecording(
         path=path,
         layout="tum",
         robot=robot,
-        calibration=RobotCalibration(undistortion.camera, SE3.identity(), level),
+        calibration=RobotCalibration(
+            undistortion.camera,
+            T_imu_camera,
+            level_body(up_imu, T_imu_camera),
+            inertial.noise if inertial else None,
+        ),
         camera_stamps=stamps,
-        imu=None,
-        magnetic=None,
+        imu=inertial.samples if inertial else None,
+        magnetic=read_magnetic(magnetic_file) if magnetic_file.exists() else None,
         read_image=read_grey_image if robot == Source.MAV else read_image,
         pose_frame="camera",
         T_pose_camera=SE3.identity(),
     )
 
 
-def _lens(path: Path, calibration_file: Path | None) -> Lens:
-    """From the file that the user names, one beside the images, or the published table."""
+def _inertial(
+    path: Path, calibration_file: Path | None, stamps: NDArray[np.int64]
+) -> Inertial | None:
+    """The IMU of a folder that has one, whose place the camera's calibration tells."""
+    if not (path / "imu0").exists():
+        return None
+    if calibration_file is None:
+        raise RecordingError(
+            f"{path / 'imu0'}: where the camera sits is unknown; give a calibration with the "
+            "key T_BS (--calibration FILE, or calibration.yaml in the folder)"
+        )
+    return read_inertial(path / "imu0", read_pose(calibration_file), stamps)
+
+
+def _calibration_file(path: Path, given: Path | None) -> Path | None:
+    """The file that the user names, or one beside the images."""
     candidates = [path / name for name in CALIBRATION_NAMES]
-    file = calibration_file or next((f for f in candidates if f.is_file()), None)
-    if file is not None:
-        return read_lens(file)
+    return given or next((f for f in candidates if f.is_file()), None)
+
+
+def _published_lens(path: Path) -> Lens:
     # The name of the recording stands in the folder's name, and in comments of the lists.
     comments = [
         line

@@ -26,6 +26,8 @@ START_S = 1.0
 """Over this time the accelerometer is averaged to find what is up [s]."""
 RIGID_TOLERANCE = 1e-4
 """Published poses are rounded; beyond this they are wrong."""
+ROUNDING = 1e-14
+"""Products of a rotation's numbers are off by this at most."""
 UPSIDE_DOWN = -0.3
 """Cosine below which "up" is on the wrong side; a right one is above 0.5, a flipped below -0.5."""
 
@@ -147,7 +149,10 @@ def rigid(numbers: ArrayLike, path: Path, key: str) -> SE3:
             f"{path}: key '{key}': is not rigid: its 3x3 part is off a rotation by {off:.1e} "
             f"(determinant {np.linalg.det(rotation):.3f}); expected R R^T = I, determinant 1"
         )
-    return SE3(nearest_rotation(rotation), matrix[:3, 3])
+    # What is a rotation already stays as published, to the last bit.
+    if off > ROUNDING:
+        rotation = nearest_rotation(rotation)
+    return SE3(rotation, matrix[:3, 3])
 
 
 def level_body(up_imu: NDArray[np.float64], T_imu_camera: SE3) -> SE3:

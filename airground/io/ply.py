@@ -72,17 +72,18 @@ def read_ply(path: Path) -> tuple[PointCloud, NDArray[np.uint8] | None]:
 def _parse_header(path: Path, header: str) -> tuple[int, np.dtype]:
     """Number of points and the type of one."""
     kinds = {ply: kind for kind, ply in _PLY_TYPES.items()}
-    count, fields = None, []
+    count: int | None = None
+    fields: list[tuple[str, str]] = []
     for line in header.splitlines()[1:]:
         match line.split():
             case ["format", "binary_little_endian", "1.0"] | ["comment", *_]:
                 pass
-            case ["element", "vertex", number] if number.isdecimal():
+            case ["element", "vertex", number] if number.isdecimal() and len(number) < 19:
                 count = int(number)
-            case ["property", kind, name] if kind in kinds:
+            case ["property", kind, name] if kind in kinds and name not in dict(fields):
                 fields.append((name, kinds[kind]))
             case _:
-                raise InputError(f"{path}: cannot read the PLY header line '{line}'")
+                raise InputError(f"{path}: cannot read the PLY header line '{line[:60]}'")
     names = {name for name, _ in fields}
     missing = [name for name, _ in _POSITION + _COLOUR if name not in names]
     if count is None or missing:

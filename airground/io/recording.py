@@ -28,6 +28,7 @@ from airground.io.digests import path_digest
 from airground.io.euroc import read_image_list, read_imu, read_magnetic
 from airground.io.header import Header, read_header
 from airground.io.image_source import ImageFiles, ImageSource
+from airground.io.listed_files import listed_files
 from airground.io.message_order import bundles
 from airground.io.plausibility import (
     CAMERA_STEP_S,
@@ -88,16 +89,18 @@ class Recording:
             raise RecordingError(f"{path}: no such recording (a folder with {layout.HEADER})")
         header = read_header(path / layout.HEADER)
         mav_stamps, mav_names = read_image_list(path / layout.MAV_CAMERA_LIST)
-        associations = read_associations(path / layout.GROUND_ASSOCIATIONS)
-        ground_stamps, colour_names, depth_names = associations
+        pairs = path / layout.GROUND_ASSOCIATIONS
+        ground_stamps, colour_names, depth_names = read_associations(pairs)
         _check_count(path / layout.MAV_CAMERA_LIST, len(mav_stamps), header.frames.mav)
-        _check_count(path / layout.GROUND_ASSOCIATIONS, len(ground_stamps), header.frames.ground)
+        _check_count(pairs, len(ground_stamps), header.frames.ground)
         mav, ground = header.calibration.mav, header.calibration.ground
         if images is None:
             images = ImageFiles(
-                mav_files=tuple(path / layout.MAV_IMAGES / name for name in mav_names),
-                ground_colour_files=tuple(path / "ground" / name for name in colour_names),
-                ground_depth_files=tuple(path / "ground" / name for name in depth_names),
+                mav_files=tuple(
+                    listed_files(path / layout.MAV_IMAGES, mav_names, path / layout.MAV_CAMERA_LIST)
+                ),
+                ground_colour_files=tuple(listed_files(path / "ground", colour_names, pairs)),
+                ground_depth_files=tuple(listed_files(path / "ground", depth_names, pairs)),
                 mav_camera=mav.camera.pinhole(),
                 ground_camera=ground.camera.pinhole(),
                 depth_units_per_m=ground.depth.units_per_m,
@@ -229,8 +232,9 @@ class Recording:
         Raises:
             RecordingError: Names the first file or image folder that differs.
         """
-        for name, digest in self.header.digests.items():
-            place = self.path / name
+        digests = self.header.digests
+        places = listed_files(self.path, digests, self.path / layout.HEADER)
+        for place, digest in zip(places, digests.values(), strict=True):
             if not place.exists():
                 raise RecordingError(f"{place}: is missing from the recording")
             if path_digest(place) != digest:

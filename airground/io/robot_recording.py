@@ -66,6 +66,10 @@ class RobotRecording:
         Raises:
             RecordingError: An image cannot be read or does not fit the calibration.
         """
-        images = (self.read_image(index) for index in range(len(self.camera_stamps)))
-        for _, bundle in bundles(self.robot, images, self.imu, self.magnetic):
+        for _, bundle in self.bundles():
             yield from bundle
+
+    def bundles(self) -> Iterator[tuple[int, list[Stamped]]]:
+        """Each image's stamp, and the image after the samples since the one before it."""
+        images = (self.read_image(index) for index in range(len(self.camera_stamps)))
+        return bundles(self.robot, images, self.imu, self.magnetic)

@@ -12,12 +12,24 @@ import yaml
 from airground.core.messages import ImuNoise
 from airground.core.se3 import SE3
 from airground.errors import RecordingError
+from airground.io.calibration import MAX_SIDE_PX
 from airground.io.euroc import read_lines
+from airground.io.header import shortened
 from airground.io.lens import Lens
 from airground.io.plausibility import rigid
 
 DISTORTION_MODELS = ("radial-tangential", "radtan")
 """Names of the one distortion model that is known, as EuRoC and Kalibr write it."""
+
+
+class _PlainLoader(yaml.SafeLoader):
+    """Numbers, text, lists and tables; aliases, of which few can mean millions, are refused."""
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            mark = self.peek_event().start_mark
+            raise yaml.YAMLError(f"aliases are not read (line {mark.line + 1})")
+        return super().compose_node(parent, index)
 
 
 def read_mapping(path: Path) -> dict[str, Any]:
@@ -34,10 +46,12 @@ def read_mapping(path: Path) -> dict[str, Any]:
             return tomllib.loads("\n".join(lines))
         if lines and lines[0].startswith("%YAML"):
             lines[0] = ""
-        values = yaml.safe_load("\n".join(lines))
-    except (yaml.YAMLError, tomllib.TOMLDecodeError) as error:
+        values = _PlainLoader("\n".join(lines)).get_single_data()
+    except (yaml.YAMLError, tomllib.TOMLDecodeError, ValueError) as error:
         reason = " ".join(str(error).split())
         raise RecordingError(f"{path}: cannot be read: {reason}") from None
+    except RecursionError:
+        raise RecordingError(f"{path}: cannot be read: its brackets are nested too deep") from None
     if not isinstance(values, dict):
         raise RecordingError(f"{path}: expected 'key: value' lines, as in EuRoC's sensor.yaml")
     return values
@@ -52,12 +66,18 @@ def read_lens(path: Path) -> Lens:
     values = read_mapping(path)
     model = values.get("camera_model", "pinhole")
     if model != "pinhole":
-        raise RecordingError(f"{path}: key 'camera_model': '{model}' is unknown; known: pinhole")
+        raise RecordingError(
+            f"{path}: key 'camera_model': {shortened(model)} is unknown; known: pinhole"
+        )
     width, height = (round(v) for v in _numbers(values, "resolution", (2,), path))
     fx, fy, cx, cy = _numbers(values, "intrinsics", (4,), path)
     coefficients = _distortion(values, path)
     if min(width, height) < 1 or min(fx, fy) <= 0:
         raise RecordingError(f"{path}: image size and focal lengths (fx, fy) must be positive")
+    if max(width, height) > MAX_SIDE_PX:
+        raise RecordingError(
+            f"{path}: key 'resolution': {width}x{height} is more than {MAX_SIDE_PX} pixels a side"
+        )
     if not (0 <= cx < width and 0 <= cy < height):
         raise RecordingError(
             f"{path}: key 'intrinsics': the principal point ({cx:g}, {cy:g}) lies outside the "
@@ -85,7 +105,9 @@ def read_imu_noise(path: Path) -> ImuNoise:
         value = _value(values, key, path)
         number = _as_numbers([value])
         if number is None or number[0] <= 0:
-            raise RecordingError(f"{path}: key '{key}': expected a positive number, got {value!r}")
+            raise RecordingError(
+                f"{path}: key '{key}': expected a positive number, got {shortened(value)}"
+            )
         numbers.append(number[0])
     return ImuNoise(*numbers)
 
@@ -94,7 +116,7 @@ def _distortion(values: dict[str, Any], path: Path) -> tuple[float, ...]:
     model = _value(values, "distortion_model", path)
     if model not in DISTORTION_MODELS:
         raise RecordingError(
-            f"{path}: key 'distortion_model': '{model}' is unknown; known: "
+            f"{path}: key 'distortion_model': {shortened(model)} is unknown; known: "
             f"{', '.join(DISTORTION_MODELS)} (coefficients k1, k2, p1, p2 and perhaps k3)"
         )
     return _numbers(values, "distortion_coefficients", (4, 5), path)
@@ -113,7 +135,9 @@ def _numbers(
     numbers = _as_numbers(value)
     if numbers is None or len(numbers) not in counts:
         wanted = " or ".join(map(str, counts))
-        raise RecordingError(f"{path}: key '{key}': expected {wanted} numbers, got {value!r}")
+        raise RecordingError(
+            f"{path}: key '{key}': expected {wanted} numbers, got {shortened(value)}"
+        )
     return numbers
 
 

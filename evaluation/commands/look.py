@@ -27,12 +27,14 @@ class LookWords:
     rerun_level: Literal["summary", "stages", "all"] = "stages"
     """How much run.rrd keeps of each second: docs/look_into_a_run.md has the sizes."""
 
-    def check_look_words(self, alone: bool, realtime: bool) -> None:
+    def check_look_words(self, alone: bool, realtime: bool, own: bool) -> None:
         """Raises InputError where a word has no meaning."""
         if self.rerun_level != "stages" and not self.looks:
             raise InputError("--rerun-level: only with --rerun or --rerun-live")
         if self.looks and alone:
             raise InputError("--rerun: shows both robots; leave --only out")
+        if self.looks and own:
+            raise InputError("--rerun: needs a recording that simulate has written")
         if self.looks and realtime:
             raise InputError(
                 "--rerun: drawing would slow a live run down; run it again without --realtime, "

@@ -12,6 +12,7 @@ from tyro.conf import Positional, arg
 from airground.errors import InputError
 from evaluation.commands.alone import AloneWords
 from evaluation.commands.look import LookWords
+from evaluation.commands.own import OwnWords
 from evaluation.commands.realtime import RealtimeWords
 from evaluation.commands.words import OutWord, SeedWord, SetupWords, Verb
 
@@ -27,28 +28,36 @@ DROPPED = "dropped.json"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run(Verb, AloneWords, RealtimeWords, LookWords, SetupWords, SeedWord, OutWord):
+class Run(Verb, OwnWords, AloneWords, RealtimeWords, LookWords, SetupWords, SeedWord, OutWord):
     """Run the pipeline over a recording and measure it against the truth.
 
     Leaves the augmented map and both robots' paths beside the measurements and the report.
     With --only it tracks one robot, and leaves its trajectory. With --realtime the recording
-    is played at its own rate, and dropped.json says which frames were too many. With --rerun it
-    leaves run.rrd, which `airground view` opens.
+    is played at its own rate, and dropped.json says which frames were too many. With --mav and
+    --ground both robots' recordings are one's own, and what is measured needs no truth. With
+    --rerun it leaves run.rrd, which `airground view` opens.
     """
 
-    recording: Annotated[Positional[Path], arg(metavar="RECORDING")]
+    recording: Annotated[
+        Positional[Path | None],
+        arg(metavar="RECORDING", help_behavior_hint="(or --mav and --ground)"),
+    ] = None
     """A folder that simulate has written."""
 
     def main(self) -> None:
         self.check_alone_words()
         self.check_realtime_words(self.only)
-        self.check_look_words(self.only is not None, self.realtime)
-        if self.only is not None:
+        live = self.realtime or self.drops is not None
+        self.check_own_words(self.recording, self.only is not None, live)
+        self.check_look_words(self.only is not None, self.realtime, self.recording is None)
+        if self.recording is None:
+            self.run_own(self.out, self.with_given(self.setup()), self.checked_seed())
+        elif self.only is not None:
             self.run_one(self.recording, self.out, self.resolved_config(), self.checked_seed())
         else:
-            self._run_both()
+            self._run_both(self.recording)
 
-    def _run_both(self) -> None:
+    def _run_both(self, path: Path) -> None:
         from airground.io.layout import HEADER
         from airground.io.recording import Recording
         from evaluation.close_up import CloseUp
@@ -58,14 +67,15 @@ class Run(Verb, AloneWords, RealtimeWords, LookWords, SetupWords, SeedWord, OutW
         from evaluation.screen import print_summary
         from sim.truth import Truth
 
-        if self.recording.is_dir() and not (self.recording / HEADER).exists():
+        if path.is_dir() and not (path / HEADER).exists():
             raise InputError(
-                f"{self.recording}: has no {HEADER}; both robots run from a recording that "
-                "simulate has written, one alone from EuRoC or TUM RGB-D with --only"
+                f"{path}: has no {HEADER}; both robots run from a recording that simulate has "
+                "written, or from --mav and --ground, one alone from EuRoC or TUM RGB-D with --only"
             )
-        setup, seed = replace(self.setup(), variant=self.variant()), self.checked_seed()
+        setup = self.with_given(replace(self.setup(), variant=self.variant()))
+        seed = self.checked_seed()
         with fresh_folder(self.out) as folder:
-            recording = Recording.open(self.recording)
+            recording = Recording.open(path)
             truth = Truth.open(recording.path)
             closeup = CloseUp(recording, truth, setup) if self.looks else None
             with self.watching(folder, recording, truth) as onlookers:

@@ -1,0 +1,90 @@
+"""A COLMAP model in text form, of true poses and true points (colmap.github.io/format).
+
+    images/mav/ images/ground/                         every tenth image
+    sparse/0/{cameras,images,points3D}.txt             as an external mapper would have left
+
+COLMAP's pixels: the centre of the upper left one is at (0.5, 0.5). Its poses map the world
+to the camera, quaternions are w x y z.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+
+from evaluation.datasets.simulated import Simulated, copy_images
+from evaluation.datasets.views import View, Views, choose_views
+from sim.motion import ROBOTS, Robot
+
+PIXEL_CENTRE = 0.5
+MIN_VIEWS = 2
+"""A point that fewer images see is no track."""
+
+
+def write_colmap_folder(folder: Path, simulated: Simulated, robots: tuple[Robot, ...]) -> None:
+    """Fill an empty folder with images and a sparse model."""
+    views = choose_views(simulated, robots)
+    for robot in robots:
+        files = [view.file for view in views.views if view.robot == robot]
+        copy_images(files, folder / "images" / robot)
+    model = folder / "sparse" / "0"
+    model.mkdir(parents=True)
+    _write(model / "cameras.txt", [_camera_line(simulated, robot) for robot in robots])
+    kept = views.times_seen() >= MIN_VIEWS
+    tracks: dict[int, list[str]] = defaultdict(list)
+    lines = []
+    for image_id, view in enumerate(views.views, start=1):
+        shown = kept[view.seen.indices]
+        points = view.seen.indices[shown].tolist()
+        lines += [_image_line(image_id, view), _pixels_line(view, shown)]
+        for position, point in enumerate(points):
+            tracks[point].append(f"{image_id} {position}")
+    _write(model / "images.txt", lines)
+    _write(model / "points3D.txt", _point_lines(views, tracks))
+
+
+def _camera_line(simulated: Simulated, robot: Robot) -> str:
+    camera = simulated.truth.camera(robot)
+    cx, cy = camera.cx + PIXEL_CENTRE, camera.cy + PIXEL_CENTRE
+    size = f"{camera.width} {camera.height}"
+    return f"{_camera_id(robot)} PINHOLE {size} {camera.fx!r} {camera.fy!r} {cx!r} {cy!r}"
+
+
+def _camera_id(robot: Robot) -> int:
+    return ROBOTS.index(robot) + 1
+
+
+def _image_line(image_id: int, view: View) -> str:
+    T_camera_world = view.T_world_camera.inverse()
+    x, y, z, w = T_camera_world.quaternion_xyzw().tolist()
+    numbers = [w, x, y, z, *T_camera_world.translation.tolist()]
+    pose = " ".join(map(repr, numbers))
+    return f"{image_id} {pose} {_camera_id(view.robot)} {view.robot}/{view.file.name}"
+
+
+def _pixels_line(view: View, shown: np.ndarray) -> str:
+    pixels = (view.seen.pixels[shown] + PIXEL_CENTRE).tolist()
+    points = view.seen.indices[shown].tolist()
+    return " ".join(
+        f"{x:.4f} {y:.4f} {_point_id(point)}" for (x, y), point in zip(pixels, points, strict=True)
+    )
+
+
+def _point_lines(views: Views, tracks: dict[int, list[str]]) -> list[str]:
+    """Ascending; their error is 0, for nobody measured them."""
+    lines = []
+    for point in sorted(tracks):
+        place = " ".join(f"{value:.6f}" for value in views.cloud.points[point].tolist())
+        colour = " ".join(map(str, views.cloud.colours[point].tolist()))
+        lines.append(f"{_point_id(point)} {place} {colour} 0 {' '.join(tracks[point])}")
+    return lines
+
+
+def _point_id(point: int) -> int:
+    return point + 1
+
+
+def _write(path: Path, lines: list[str]) -> None:
+    path.write_text("\n".join([f"# {path.stem} of the truth, by airground", *lines]) + "\n")

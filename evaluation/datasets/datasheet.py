@@ -1,0 +1,167 @@
+"""A dataset's data sheet: how it was made, from the facts themselves."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airground import __version__
+from airground.core.trajectory import Trajectory
+from airground.io.header import Header, read_header
+from airground.io.layout import HEADER, TRUTH
+from airground.io.tum import read_tum
+from sim.motion import ROBOTS
+from sim.presets import SensorPreset
+from sim.scene import Scene
+
+CONVENTIONS = """\
+## Frames and units
+
+- Metres, seconds (nanoseconds in stamps), radians unless a name says otherwise. `T_a_b` maps
+  coordinates in frame b to frame a.
+- `world`: z up, the floor's middle is the origin. `body`: x forward, z up. `camera`: x right,
+  y down, z forward. `truth/*.tum` are `T_world_body` with quaternions x y z w.
+- Integer pixel coordinates are pixel centres. Depth is z along the optical axis, 5000 a metre,
+  0 is missing.
+- `mav0/` is in EuRoC's form, `ground/` in TUM's; `recording.toml` has the calibration as a user
+  is told, `truth/calibration.toml` as it is.
+
+## Known limits
+
+- Simulated: MuJoCo's boxes and light, rendered; no real image is among them.
+- Global shutter, no lens distortion, no rolling shutter, no wind; nothing moves but the robots.
+- Depth has the noise of structured light, without interference or multipath.
+- Recordings of one scene share its room, its paths (moved a little by the seed) and its light;
+  a test part of the same scenes says nothing of other scenes.
+- All randomness comes from the seed: the same version makes the same bytes.
+"""
+
+
+def datasheet(
+    name: str,
+    scenes: Sequence[Scene],
+    sensors: SensorPreset,
+    recordings: Sequence[tuple[str, Path]],
+) -> str:
+    """The text of `DATASHEET.md`.
+
+    Args:
+        name: Of the dataset.
+        scenes: All that are in it.
+        sensors: How good the sensors are.
+        recordings: Part and folder of each recording.
+    """
+    headers = [(part, folder, read_header(folder / HEADER)) for part, folder in recordings]
+    lines = [
+        f"# {name}",
+        "",
+        f"{len(headers)} recordings of a MAV over, and a ground robot in, {len(scenes)} simulated "
+        f"scenes, made by airground {__version__} (`airground simulate`).",
+        "",
+        *_parts(headers),
+        *_scenes(scenes),
+        *_robots(headers[0][2]),
+        *_noise(sensors),
+        CONVENTIONS,
+        *_recordings(headers),
+    ]
+    return "\n".join(lines)
+
+
+Recorded = tuple[str, Path, Header]
+
+
+def _parts(headers: Sequence[Recorded]) -> list[str]:
+    parts: dict[str, list[Header]] = defaultdict(list)
+    for part, _, header in headers:
+        parts[part].append(header)
+    rows = [
+        [
+            part,
+            len(of),
+            f"{sum(h.duration_s for h in of):g}",
+            sum(h.frames.mav for h in of),
+            sum(h.frames.ground for h in of),
+        ]
+        for part, of in sorted(parts.items())
+    ]
+    columns = ["part", "recordings", "seconds", "MAV images", "ground images"]
+    return [
+        "## Parts",
+        "",
+        "No world (scene and seed) is in two parts.",
+        "",
+        *_table(columns, rows),
+    ]
+
+
+def _scenes(scenes: Sequence[Scene]) -> list[str]:
+    rows = [
+        [
+            scene.name,
+            scene.description,
+            " x ".join(f"{side:g}" for side in scene.room.size_m),
+            scene.rubble.boxes if scene.rubble else "-",
+            f"{scene.mav.height_m:g}",
+            f"{100 * scene.overlap_expected:.0f} %",
+        ]
+        for scene in scenes
+    ]
+    columns = ["scene", "what", "room [m]", "boxes", "flight height [m]", "overlap"]
+    return ["## Geometry", "", *_table(columns, rows)]
+
+
+def _robots(header: Header) -> list[str]:
+    rows: list[list[Any]] = []
+    for robot in ROBOTS:
+        table = header.calibration.mav if robot == "mav" else header.calibration.ground
+        camera = table.camera
+        view = np.rad2deg(2 * np.arctan(camera.width / 2 / camera.fx))
+        rows.append(
+            [
+                robot,
+                f"{camera.width} x {camera.height} at {camera.rate_hz:g} Hz, {view:.0f} deg wide",
+                "-" if robot == "mav" else "registered, 16 bit",
+                f"{table.imu.rate_hz:g} Hz",
+                f"{table.magnetometer.rate_hz:g} Hz",
+            ]
+        )
+    columns = ["robot", "camera", "depth", "IMU", "magnetometer"]
+    return ["## Sensors", "", *_table(columns, rows)]
+
+
+def _noise(sensors: SensorPreset) -> list[str]:
+    rows = [
+        [kind, key, f"{np.round(value, 9)}"]
+        for kind, values in asdict(sensors).items()
+        if isinstance(values, dict)
+        for key, value in values.items()
+    ]
+    title = f"## Noise and calibration errors: {sensors.name}"
+    if not rows:
+        return [title, "", "None: every sensor is perfect.", ""]
+    return [title, "", *_table(["sensor", "parameter", "value"], rows)]
+
+
+def _recordings(headers: Sequence[Recorded]) -> list[str]:
+    rows = []
+    for part, folder, header in headers:
+        paths = [_path(read_tum(folder / TRUTH / f"{robot}.tum")) for robot in ROBOTS]
+        rows.append([f"{part}/{folder.name}", header.scene, header.seed, f"{header.duration_s:g}"])
+        rows[-1] += paths
+    columns = ["recording", "scene", "seed", "seconds", "MAV path [m]", "ground path [m]"]
+    return ["## Recordings", "", *_table(columns, rows)]
+
+
+def _path(trajectory: Trajectory) -> str:
+    return f"{trajectory.path_m():.1f}"
+
+
+def _table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> list[str]:
+    lines = [columns, ["---"] * len(columns), *rows]
+    return [*("| " + " | ".join(map(str, line)) + " |" for line in lines), ""]

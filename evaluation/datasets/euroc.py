@@ -1,0 +1,105 @@
+"""The MAV as an EuRoC/ASL folder (Burri et al., IJRR 2016).
+
+mav0/body.yaml
+mav0/cam0/ imu0/                     as recorded; the body of T_BS is the IMU
+mav0/state_groundtruth_estimate0/    the IMU in the world at 200 Hz, its velocity and biases
+mav0/pointcloud0/                    the true surface, as in EuRoC's Vicon rooms
+mav0/mag0/                           in the same form, though EuRoC had no magnetometer
+"""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter1d
+
+from airground.core.se3 import SE3
+from airground.core.trajectory import Trajectory
+from airground.io import layout
+from airground.io.euroc import sensor_yaml
+from airground.io.ply import write_ply
+from evaluation.datasets.simulated import Simulated, copy_images
+from evaluation.datasets.true_points import sample_surface
+from sim.motion import RATE_HZ, Robot
+
+YAML_START = "%YAML:1.0\n"
+"""EuRoC's files begin so; OpenCV's reader insists on it."""
+STATE_COLUMNS = (
+    "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], "
+    "q_RS_z [], v_RS_R_x [m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1], "
+    "b_w_RS_S_x [rad s^-1], b_w_RS_S_y [rad s^-1], b_w_RS_S_z [rad s^-1], "
+    "b_a_RS_S_x [m s^-2], b_a_RS_S_y [m s^-2], b_a_RS_S_z [m s^-2]"
+)
+BIAS_WINDOW_S = 1.0
+"""Biases are what the samples are off the truth, averaged by a Gaussian this wide [s]."""
+SURFACE_POINTS = 200_000
+
+
+def write_euroc_folder(folder: Path, simulated: Simulated, robots: tuple[Robot, ...]) -> None:
+    """Fill an empty folder with `mav0/`."""
+    assert robots == ("mav",)
+    recording = simulated.recording
+    copy_images(simulated.files.mav_files, folder / layout.MAV_IMAGES)
+    for sensor in (layout.MAV_CAMERA, layout.MAV_IMU, layout.MAV_MAGNETOMETER):
+        (folder / sensor).mkdir(exist_ok=True)
+        shutil.copyfile(recording.path / sensor / "data.csv", folder / sensor / "data.csv")
+        yaml = (recording.path / sensor / "sensor.yaml").read_text(encoding="utf-8")
+        _write_yaml(folder / sensor / "sensor.yaml", yaml)
+    comment = f"airground {recording.scene}, seed {recording.seed}, flight {recording.flight}"
+    _write_yaml(folder / "mav0" / "body.yaml", f"comment: {comment}\n")
+    state = folder / "mav0" / "state_groundtruth_estimate0"
+    state.mkdir()
+    _write_yaml(state / "sensor.yaml", sensor_yaml("visual-inertial", SE3.identity(), {}))
+    _write_states(state / "data.csv", simulated)
+    surface = folder / "mav0" / "pointcloud0"
+    surface.mkdir()
+    _write_yaml(surface / "sensor.yaml", sensor_yaml("pointcloud", SE3.identity(), {}))
+    write_ply(surface / "data.ply", sample_surface(simulated.truth, SURFACE_POINTS))
+
+
+def true_imu(simulated: Simulated, robot: Robot) -> tuple[Trajectory, NDArray[np.float64]]:
+    """Of the IMU at 200 Hz: `T_world_imu`, and velocity in the world (N, 3) [m/s]."""
+    motion = simulated.motion(robot)
+    T_body_imu = motion.mounting.T_body_imu
+    arm = T_body_imu.translation
+    rotations = motion.rotations_world
+    poses = Trajectory(
+        simulated.truth.motion.stamps_ns,
+        rotations @ T_body_imu.rotation,
+        motion.positions_world + rotations @ arm,
+    )
+    swing = np.einsum("nij,nj->ni", rotations, np.cross(motion.angular_velocities_body, arm))
+    return poses, motion.velocities_world + swing
+
+
+def _write_states(path: Path, simulated: Simulated) -> None:
+    poses, velocities = true_imu(simulated, "mav")
+    quaternions_wxyz = np.roll(poses.quaternions_xyzw(), 1, axis=1)
+    table = np.hstack([poses.translations, quaternions_wxyz, velocities, _biases(simulated)])
+    lines = [
+        f"{stamp}," + ",".join(f"{value:.9f}" for value in row)
+        for stamp, row in zip(poses.stamps_ns.tolist(), table.tolist(), strict=True)
+    ]
+    path.write_text("\n".join([STATE_COLUMNS, *lines]) + "\n", encoding="utf-8")
+
+
+def _biases(simulated: Simulated) -> NDArray[np.float64]:
+    """(N, 6) of gyro [rad/s] and accelerometer [m/s^2].
+
+    A recording does not keep what its simulator drew. As EuRoC's own these are estimates,
+    but made with the truth: what is left of the white noise is its density over
+    sqrt(2 sqrt(pi) BIAS_WINDOW_S).
+    """
+    samples, _ = simulated.samples("mav")
+    motion = simulated.motion("mav")
+    off = np.hstack([samples.gyro - motion.gyro_imu, samples.accelerometer]) - np.hstack(
+        [np.zeros_like(motion.gyro_imu), motion.specific_force_imu]
+    )
+    return gaussian_filter1d(off, BIAS_WINDOW_S * RATE_HZ, axis=0, mode="nearest")
+
+
+def _write_yaml(path: Path, text: str) -> None:
+    path.write_text(YAML_START + text, encoding="utf-8")

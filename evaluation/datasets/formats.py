@@ -1,0 +1,74 @@
+"""The formats by name: a literal table.
+
+To add one, write a function that fills an empty folder, and put a line here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from airground.errors import InputError
+from evaluation.datasets.colmap import write_colmap_folder
+from evaluation.datasets.euroc import write_euroc_folder
+from evaluation.datasets.mcap import write_bag
+from evaluation.datasets.nerfstudio import write_nerfstudio_folder
+from evaluation.datasets.simulated import Simulated
+from evaluation.datasets.tum import write_tum_folder
+from sim.motion import ROBOTS, Robot
+
+Robots = tuple[Robot, ...]
+
+
+@dataclass(frozen=True)
+class Format:
+    """A way to hand a recording on.
+
+    Attributes:
+        write: Fills an empty folder with what these robots sensed.
+        usual: Whom it takes where nobody says.
+        possible: What it can hold.
+        because: Why it holds nothing else.
+    """
+
+    write: Callable[[Path, Simulated, Robots], None]
+    usual: Robots
+    possible: tuple[Robots, ...]
+    because: str = ""
+
+
+MAV: Robots = ("mav",)
+GROUND: Robots = ("ground",)
+
+FORMATS = {
+    "tum": Format(write_tum_folder, GROUND, (GROUND,), "every image needs its depth"),
+    "euroc": Format(write_euroc_folder, MAV, (MAV,), "it has no depth images"),
+    "mcap": Format(write_bag, ROBOTS, (ROBOTS, MAV, GROUND)),
+    "nerfstudio": Format(
+        write_nerfstudio_folder,
+        GROUND,
+        (GROUND, MAV),
+        "one transforms.json is of one camera: give --robot mav or --robot ground",
+    ),
+    "colmap": Format(write_colmap_folder, ROBOTS, (ROBOTS, MAV, GROUND)),
+}
+
+
+def robots_for(name: str, wanted: str | None) -> Robots:
+    """The robots that go into a format.
+
+    Args:
+        name: Of the format.
+        wanted: "mav", "ground" or "both"; None for the usual.
+
+    Raises:
+        InputError: The format cannot hold them.
+    """
+    chosen = FORMATS[name]
+    asked: dict[str | None, Robots] = {None: chosen.usual, "both": ROBOTS}
+    asked |= {robot: (robot,) for robot in ROBOTS}
+    robots = asked[wanted]
+    if robots not in chosen.possible:
+        raise InputError(f"--robot {wanted}: not with --format {name}: {chosen.because}")
+    return robots

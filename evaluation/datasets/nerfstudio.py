@@ -1,0 +1,82 @@
+"""One robot's images for Nerfstudio and those who read its `transforms.json`.
+
+    transforms.json    true intrinsics and true poses, camera to world, in OpenGL's axes
+    images/            every tenth image
+    depths/            the ground robot's measured depth, 16 bit, millimetres, 0 is missing
+    points.ply         true points in the images' colours, to begin splats from
+
+OpenGL's camera looks along -z with y up. Nerfstudio takes pixel centres to be at halves.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from airground.core.camera import PinholeCamera
+from airground.core.cloud import PointCloud
+from airground.core.se3 import SE3
+from airground.io.ply import write_ply
+from evaluation.datasets.simulated import Simulated, copy_images
+from evaluation.datasets.views import View, choose_views
+from sim.motion import Robot
+
+PIXEL_CENTRE = 0.5
+MM_PER_M = 1000.0
+T_CAMERA_OPENGL = SE3(np.diag([1.0, -1.0, -1.0]), np.zeros(3))
+
+
+def write_nerfstudio_folder(folder: Path, simulated: Simulated, robots: tuple[Robot, ...]) -> None:
+    """Fill an empty folder with one robot's images and their poses."""
+    (robot,) = robots
+    views = choose_views(simulated, robots)
+    copy_images([view.file for view in views.views], folder / "images")
+    frames = [_frame(view) for view in views.views]
+    if robot == "ground":
+        (folder / "depths").mkdir()
+        for frame, view in zip(frames, views.views, strict=True):
+            frame["depth_file_path"] = f"depths/{view.file.name}"
+            _write_depth(folder / frame["depth_file_path"], simulated, view)
+    seen = views.times_seen() > 0
+    write_ply(
+        folder / "points.ply", PointCloud(views.cloud.points[seen], views.cloud.colours[seen])
+    )
+    content = {
+        **_intrinsics(simulated.truth.camera(robot)),
+        "ply_file_path": "points.ply",
+        "frames": frames,
+    }
+    text = json.dumps(content, indent=1) + "\n"
+    (folder / "transforms.json").write_text(text, encoding="utf-8")
+
+
+def _intrinsics(camera: PinholeCamera) -> dict[str, Any]:
+    """OPENCV with no distortion: the one model that all readers of this file know."""
+    return {
+        "camera_model": "OPENCV",
+        "w": camera.width,
+        "h": camera.height,
+        "fl_x": camera.fx,
+        "fl_y": camera.fy,
+        "cx": camera.cx + PIXEL_CENTRE,
+        "cy": camera.cy + PIXEL_CENTRE,
+        **dict.fromkeys(("k1", "k2", "p1", "p2"), 0.0),
+    }
+
+
+def _frame(view: View) -> dict[str, Any]:
+    T_world_opengl = view.T_world_camera @ T_CAMERA_OPENGL
+    return {
+        "file_path": f"images/{view.file.name}",
+        "transform_matrix": T_world_opengl.matrix().tolist(),
+    }
+
+
+def _write_depth(path: Path, simulated: Simulated, view: View) -> None:
+    depth_mm = np.nan_to_num(simulated.recording.read_ground_image(view.index).depth) * MM_PER_M
+    if not cv2.imwrite(str(path), np.rint(depth_mm).astype(np.uint16)):
+        raise OSError(f"{path}: cannot be written")

@@ -1,0 +1,67 @@
+"""The ground robot as a TUM RGB-D folder (Sturm et al., IROS 2012).
+
+rgb.txt depth.txt rgb/ depth/    16-bit depth, 5000 a metre, 0 is missing
+associations.txt                 colour and depth in pairs, as their associate.py writes
+accelerometer.txt                in a Kinect's axes
+groundtruth.txt                  the colour camera in the world, at the stamp of each image
+calibration.yaml imu0/ mag0/     which TUM's own folders lack: the calibration that the
+                                 robot is told, its gyro and its magnetometer
+"""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from airground.core.messages import ImuSamples
+from airground.errors import InputError
+from airground.io import layout
+from airground.io.euroc import camera_yaml
+from airground.io.plain_tum import ACCELEROMETER_AXES, DEPTH_UNITS_PER_M
+from airground.io.tum import write_accelerometer, write_tum
+from evaluation.datasets.simulated import Simulated, copy_images
+from sim.motion import Robot
+
+SAME_FILES = (
+    layout.GROUND_COLOUR_LIST,
+    layout.GROUND_DEPTH_LIST,
+    layout.GROUND_ASSOCIATIONS,
+    layout.GROUND_IMU_DATA,
+    f"{layout.GROUND_IMU}/sensor.yaml",
+    layout.GROUND_MAGNETOMETER_DATA,
+    f"{layout.GROUND_MAGNETOMETER}/sensor.yaml",
+)
+"""A recording has these in TUM's and EuRoC's form already."""
+
+
+def write_tum_folder(folder: Path, simulated: Simulated, robots: tuple[Robot, ...]) -> None:
+    """Fill an empty folder with what the ground robot sensed.
+
+    Raises:
+        InputError: The depth images have another unit than TUM's.
+    """
+    assert robots == ("ground",)
+    recording = simulated.recording
+    if recording.depth_units_per_m != DEPTH_UNITS_PER_M:
+        raise InputError(
+            f"{recording.path}: a metre of depth is {recording.depth_units_per_m:g} in its PNG "
+            f"files; TUM's format prescribes {DEPTH_UNITS_PER_M:g}"
+        )
+    copy_images(simulated.files.ground_colour_files, folder / "rgb")
+    copy_images(simulated.files.ground_depth_files, folder / "depth")
+    for name in SAME_FILES:
+        target = folder / Path(name).relative_to("ground")
+        target.parent.mkdir(exist_ok=True)
+        shutil.copyfile(recording.path / name, target)
+    write_accelerometer(folder / "accelerometer.txt", _of_a_kinect(simulated))
+    T_imu_camera = simulated.T_imu_camera("ground")
+    yaml = camera_yaml(simulated.told("ground").camera, T_imu_camera)
+    (folder / "calibration.yaml").write_text(yaml, encoding="utf-8")
+    write_tum(folder / "groundtruth.txt", simulated.true_cameras("ground"))
+
+
+def _of_a_kinect(simulated: Simulated) -> ImuSamples:
+    """The accelerometer's samples in the axes that a Kinect's has."""
+    samples, _ = simulated.samples("ground")
+    in_camera = samples.accelerometer @ simulated.T_imu_camera("ground").rotation
+    return ImuSamples(samples.stamps_ns, samples.gyro, in_camera * ACCELEROMETER_AXES)
