@@ -20,6 +20,7 @@ from sim.truth import Truth
 STEP_M = 1e-3
 """Depth is kept in whole steps of this."""
 SHOWN_PERCENTILES = (1, 99)
+LEAST_RANGE_M = 0.1
 ERROR_LIMIT_M = 0.03
 """The error's full colour: blue is too near, red too far."""
 
@@ -55,7 +56,7 @@ def encoded_depth(depth: NDArray[np.float32]) -> rr.EncodedDepthImage:
     seen = depth[np.isfinite(depth)]
     near, far = np.percentile(seen, SHOWN_PERCENTILES) if len(seen) else (0.0, 1.0)
     # Holes have the darkest colour to themselves.
-    limits = (near - (far - near) / 3, far)
+    limits = (near - max(far - near, LEAST_RANGE_M) / 3, far)
     return rr.EncodedDepthImage(
         blob=png.tobytes(),
         media_type="image/png",

@@ -34,7 +34,7 @@ class Level:
 LEVELS: dict[LevelName, Level] = {
     "summary": Level(5, 1, 0.5, 70, 0.5, 0.25, 0.05),
     "stages": Level(10, 5, 0.75, 75, 2, 0.5, 0.03),
-    "all": Level(30, 30, 1.0, 85, 30, 2, 0.02),
+    "all": Level(30, 30, 1.0, 75, 30, 0.5, 0.025),
 }
 
 
