@@ -101,6 +101,8 @@ class Crew:
         }
         try:
             for future, outcome in as_completed(futures, loop=client.loop, with_results=True):
+                if isinstance(outcome, CancelledError):  # so Dask says that a cluster is gone
+                    raise outcome
                 yield futures[future], outcome
                 future.release()  # so that nobody keeps what is already taken
         except KilledWorker:
