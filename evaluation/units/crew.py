@@ -5,9 +5,9 @@ A cluster runs what it is sent, as Dask does: join only one that you trust, as i
 
 from __future__ import annotations
 
-import asyncio
 import logging
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import CancelledError
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
@@ -101,6 +101,8 @@ class Crew:
         }
         try:
             for future, outcome in as_completed(futures, loop=client.loop, with_results=True):
+                if isinstance(outcome, CancelledError):  # so Dask says that a cluster is gone
+                    raise outcome
                 yield futures[future], outcome
                 future.release()  # so that nobody keeps what is already taken
         except KilledWorker:
@@ -108,7 +110,7 @@ class Crew:
                 f"{DEATHS + 1} processes died over the same task, perhaps for lack of memory; "
                 "with fewer --threads less runs at a time"
             ) from None
-        except (asyncio.CancelledError, CommClosedError):
+        except (CancelledError, CommClosedError):
             raise AirgroundError(
                 "the cluster went away; run the same again: what is finished is kept"
             ) from None

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import dask
 import pytest
-from distributed import LocalCluster
+from distributed import Client, LocalCluster
 
-from airground.errors import InputError
+from airground.errors import AirgroundError, InputError
 from evaluation.units.batch_system import batch_cluster, read_jobs
 from evaluation.units.crew import Crew
 
@@ -23,6 +24,11 @@ jobqueue:
 
 def square(number: int) -> int:
     return number * number
+
+
+def nap(seconds: float) -> float:
+    time.sleep(seconds)
+    return seconds
 
 
 def squares(cluster: str, scratch: Path) -> list[tuple[int, int]]:
@@ -50,6 +56,17 @@ def test_a_scheduler_that_is_there_is_joined_and_left_alone(tmp_path: Path) -> N
     with scheduler(tmp_path) as address:
         for _ in range(2):
             assert squares(address, tmp_path) == [(0, 1), (1, 4), (2, 9)]
+
+
+@pytest.mark.slow
+def test_a_cluster_that_goes_away_is_told(tmp_path: Path) -> None:
+    with scheduler(tmp_path) as address, Crew(address, 1, 2, tmp_path) as crew:
+        outcomes = crew.outcomes(nap, [0.0, 600.0])
+        assert next(outcomes) == (0, 0.0)
+        with Client(address, set_as_default=False) as other:
+            other.shutdown()
+        with pytest.raises(AirgroundError, match="the cluster went away"):
+            next(outcomes)
 
 
 @pytest.mark.slow
