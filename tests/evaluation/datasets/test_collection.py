@@ -21,7 +21,8 @@ from airground.errors import AirgroundError, InputError
 from airground.io.recording import Recording
 from evaluation import cli
 from evaluation.datasets import collection
-from evaluation.datasets.collection import Plan, make_dataset, parse_seeds, parse_split
+from evaluation.datasets.collection import make_dataset
+from evaluation.datasets.plan import Plan, parse_seeds, parse_split, plan_dataset
 from sim.presets import NOMINAL
 from sim.recorder import record
 from sim.scene import load_scene
@@ -69,7 +70,7 @@ def test_a_split_keeps_worlds_apart(count: int, shares: tuple[float, float], sen
 
 def plan_of(count: int, shares: dict[str, float], sensors: str = "nominal") -> Plan:
     scenes = ["tiny", "flat"]
-    return collection.plan_dataset(scenes, range(count), shares, sensors, None)
+    return plan_dataset(scenes, range(count), shares, sensors, None)
 
 
 Made = list[str]
