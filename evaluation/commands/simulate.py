@@ -69,16 +69,17 @@ class Simulate(Verb, SensorWord, SeedWord, OutWord):
         )
 
     def _make_dataset(self, seeds: str) -> None:
-        from evaluation.datasets import collection
+        from evaluation.datasets.collection import make_dataset
+        from evaluation.datasets.plan import parse_seeds, parse_split, plan_dataset
 
         if not self.scenes or self.seed or self.flight:
             raise InputError("--seeds: with at least one SCENE, and without --seed and --flight")
-        plan = collection.plan_dataset(
+        plan = plan_dataset(
             self.scenes,
-            collection.parse_seeds(seeds),
-            collection.parse_split(self.split),
+            parse_seeds(seeds),
+            parse_split(self.split),
             self.sensors,
             self.duration_s,
         )
         jobs = int(in_range("--jobs", self.jobs, low=1, high=1000))
-        collection.make_dataset(plan, self.out, jobs, self.workers())
+        make_dataset(plan, self.out, jobs, self.workers())

@@ -31,6 +31,8 @@ EDGES = 0.2
 """Only this share of the pixels is compared: those at the strongest edges."""
 MAX_PIXELS = 10_000
 MIN_PIXELS = 500
+MIN_SHARED = 0.2
+"""Of what one image shows so much is in the other, or the pose is no pose of this camera."""
 MIN_MOTION_PX = 4.0
 """Between two images a pixel moves this far at least, or any pose would fit."""
 
@@ -55,12 +57,16 @@ class Fit:
     """How well one image fits another.
 
     Attributes:
-        offset_px: (2,) how far the truth is off in x and y.
+        offset_px: (2,) how far the truth is off in x and y; infinite where it carries the one
+            image out of the other.
         rise: Mean error two pixels beside the best place over that of the best.
     """
 
     offset_px: NDArray[np.float64]
     rise: float
+
+
+ELSEWHERE = Fit(np.full(2, np.inf), np.nan)
 
 
 class Comparison:
@@ -84,13 +90,15 @@ class Comparison:
         T_second_first = second.T_world_camera.inverse() @ first.T_world_camera
         self._points = T_second_first @ points_first
 
-    def comparable(self) -> bool:
-        """Whether enough is seen, and moves enough between the images."""
-        if len(self._points) < MIN_PIXELS:
-            return False
+    def __len__(self) -> int:
+        return len(self._points)
+
+    def moved_px(self) -> NDArray[np.float64]:
+        """(N,) how far the truth has each pixel move; NaN for those that leave the image."""
+        pixels, camera = self._camera.project(self._points), self._camera
+        inside = (pixels >= 0) & (pixels <= [camera.width - 1, camera.height - 1])
         start = np.stack([self._at[1], self._at[0]], axis=1)
-        moved = np.linalg.norm(self._camera.project(self._points) - start, axis=1)
-        return bool(np.nanmedian(moved) > MIN_MOTION_PX)
+        return np.where(inside.all(axis=1), np.linalg.norm(pixels - start, axis=1), np.nan)
 
     def error(self, x_px: float, y_px: float, smoothing_px: float = SMOOTHING_PX) -> float:
         """With the pose turned so that everything lands this much beside."""
@@ -101,9 +109,14 @@ class Comparison:
 
 
 def fit(first: Posed, second: Posed, camera: PinholeCamera) -> Fit | None:
-    """Carry the first image into the second; None where too little is seen in both."""
+    """Carry the first image into the second; None where too little is to be seen, or moves."""
     compared = Comparison(first, second, camera)
-    if not compared.comparable():
+    if len(compared) < MIN_PIXELS:
+        return None
+    moved = compared.moved_px()
+    if np.isfinite(moved).mean() < MIN_SHARED:
+        return ELSEWHERE
+    if np.nanmedian(moved) < MIN_MOTION_PX:
         return None
     coarse = {
         (x, y): compared.error(x, y, COARSE_SMOOTHING_PX) for x in COARSE_PX for y in COARSE_PX
