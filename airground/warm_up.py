@@ -6,20 +6,18 @@ import numpy as np
 
 from airground.config import Config
 from airground.dense.warm_up import warm_up_dense
-from airground.io.images import warm_up_images
 from airground.localization.warm_up import warm_up_localization
 from airground.refinement.warm_up import warm_up_refinement
 from airground.slam.warm_up import warm_up_slam
 
 
 def warm_up(config: Config, rng: np.random.Generator) -> None:
-    """Compile decoding, tracking and mapping.
+    """Compile tracking and mapping.
 
     Args:
         config: What will run.
         rng: Draws what it is tried on.
     """
-    warm_up_images()
     warm_up_slam(rng)
     warm_up_mapping(config, rng)
 

@@ -148,7 +148,8 @@ def simulate_motion(
     start_floor = float(floor_under(world.floor_height, start, "mav.start")[0])
     field = room_field(field_rng, -half, half, start_floor)
     flight = plan_flight(scene.mav, start_floor, times, flight_rng)
-    route = plan_drive(driven_path(world), world.floor_height, drive_rng)
+    path = scene.ground if scene.ground.stop_at_overlap is None else driven_path(world)
+    route = plan_drive(path, world.floor_height, drive_rng)
     return Motion(
         stamps_ns=stamps_ns,
         mav=fly(flight, 1.0 / RATE_HZ, field),

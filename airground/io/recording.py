@@ -28,6 +28,7 @@ from airground.io.digests import path_digest
 from airground.io.euroc import read_image_list, read_imu, read_magnetic
 from airground.io.header import Header, read_header
 from airground.io.image_source import ImageFiles, ImageSource
+from airground.io.images import warm_up_images
 from airground.io.listed_files import listed_files
 from airground.io.message_order import bundles
 from airground.io.plausibility import (
@@ -106,6 +107,7 @@ class Recording:
                 depth_units_per_m=ground.depth.units_per_m,
             )
             images.check_present()
+            warm_up_images()  # so that no image waits for the compiler
         recording = cls(
             path=path,
             header=header,

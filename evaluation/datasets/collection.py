@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from rich.progress import track
 
@@ -25,11 +26,11 @@ from evaluation.checked_json import read_checked
 from evaluation.datasets.datasheet import datasheet
 from evaluation.datasets.plan import Plan, World
 from evaluation.output import check_free
-from evaluation.workers import outcomes
+from evaluation.units.crew import Crew
 from sim.interrupts import end_with_parent
 from sim.presets import sensor_preset
 from sim.recorder import record
-from sim.scene import Scene, load_scene
+from sim.scene import load_scene
 
 PLAN, SHEET, LOCK = "dataset.json", "DATASHEET.md", ".lock"
 
@@ -54,9 +55,11 @@ def make_dataset(plan: Plan, out: Path, jobs: int, threads: int) -> None:
         missing = [w for w in plan.worlds if not (unfinished / w.folder).exists()]
         each = max(1, threads // jobs)
         tasks = [_Making(world, plan, unfinished, each) for world in missing]
-        done = outcomes(_make, tasks, jobs)
-        for _ in track(done, "recording", total=len(tasks), transient=True):
-            pass
+        with TemporaryDirectory() as scratch, Crew(None, jobs, len(tasks), Path(scratch)) as crew:
+            done = crew.outcomes(_make, tasks)
+            for _, refusal in track(done, "recording", total=len(tasks), transient=True):
+                if refusal is not None:
+                    raise AirgroundError(refusal)
         recordings = [(world.part, unfinished / world.folder) for world in plan.worlds]
         scenes = [load_scene(scene) for scene in dict.fromkeys(w.scene for w in plan.worlds)]
         sheet = datasheet(out.name, scenes, sensor_preset(plan.sensors), recordings)
@@ -102,15 +105,16 @@ class _Making:
     workers: int
 
 
-def _make(task: _Making) -> None:
-    """Runs in a process of its own, which must not outlive the one that holds the folder."""
+def _make(task: _Making) -> str | None:
+    """Record one world, in a process that does not outlive its parent; says why it cannot."""
     end_with_parent()
     world, plan = task.world, task.plan
-    scene: Scene = load_scene(world.scene)
     out = task.folder / world.folder
+    if out.exists():  # by a worker that died before it could say so
+        return None
     try:
         record(
-            scene,
+            load_scene(world.scene),
             world.seed,
             sensor_preset(plan.sensors),
             out,
@@ -119,4 +123,5 @@ def _make(task: _Making) -> None:
             quiet=True,
         )
     except AirgroundError as error:
-        raise AirgroundError(f"{world.name}, seed {world.seed}: {error}") from None
+        return f"{world.name}, seed {world.seed}: {error}"
+    return None

@@ -21,6 +21,7 @@ from evaluation import cli
 from evaluation.datasets import collection
 from evaluation.datasets.collection import make_dataset
 from evaluation.datasets.plan import Plan, parse_seeds, parse_split, plan_dataset
+from evaluation.units.crew import Crew
 from sim.presets import NOMINAL
 from sim.recorder import record
 from sim.scene import load_scene
@@ -85,11 +86,11 @@ def made(small: Path, monkeypatch: pytest.MonkeyPatch) -> Made:
         shutil.copytree(small, out)
         names.append(f"{scene.name} {seed}")
 
-    def one_by_one(function: Callable, tasks: Sequence, _: int) -> Iterator:
-        return (function(task) for task in tasks)
+    def one_by_one(_: Crew, function: Callable, tasks: Sequence) -> Iterator:
+        return ((index, function(task)) for index, task in enumerate(tasks))
 
     monkeypatch.setattr(collection, "record", copy)
-    monkeypatch.setattr(collection, "outcomes", one_by_one)
+    monkeypatch.setattr(Crew, "outcomes", one_by_one)
     monkeypatch.setattr(collection, "end_with_parent", lambda: None)
     return names
 
