@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from evaluation.commands.words import Verb
 
 VERBS = {
-    "simulate": "Record what the robots' sensors see in a scene.",
+    "simulate": "Record what the robots' sensors see in a scene, or in many.",
     "run": "Run the pipeline over a recording and measure it against the truth.",
     "evaluate": "Put the results of one or more runs into one report.",
     "reproduce": "Do all of it: the paper's protocol, from scenes to report.",
@@ -32,7 +32,7 @@ VERBS = {
     "view": "Look into a run with rerun: in a window, in a browser, or as a file to send.",
     "gallery": "Draw the pictures of a run as PNG files: maps, depth, costs, particles, errors.",
     "inspect": "Say what is in a dataset, and what is wrong with it.",
-    "export": "Write a recording in a format that other tools read.",
+    "export": "Write a recording, with its truth, in a format that other tools read.",
     "bench": "Time the pipeline's stages on this machine (Table I).",
     "doctor": "Look whether this machine can render and compute, and say what is missing.",
 }

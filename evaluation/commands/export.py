@@ -13,7 +13,7 @@ from evaluation.commands.words import OutWord, Verb
 
 @dataclass(frozen=True, kw_only=True)
 class Export(Verb, OutWord):
-    """Hand a recording, with its truth, to other tools in a format that they read.
+    """Write a recording, with its truth, in a format that other tools read.
 
     docs/datasets.md says for each format what lies where, in which axes and units.
     """

@@ -13,10 +13,10 @@ from evaluation.commands.words import Verb
 
 @dataclass(frozen=True, kw_only=True)
 class Inspect(Verb):
-    """Look at a recording of ours, an EuRoC or a TUM RGB-D folder, and check it.
+    """Say what is in a dataset, and what is wrong with it.
 
-    Digests, rates, gaps, calibration, and whether the true poses fit the images. Exits with 1
-    if something is wrong.
+    For recordings of ours, EuRoC and TUM RGB-D folders: digests, rates, gaps, calibration, and
+    whether the true poses fit the images. Exits with 1 if something is wrong.
     """
 
     dataset: Annotated[Positional[Path], arg(metavar="DATASET")]
