@@ -28,10 +28,11 @@ check: $(READY)
 	$(PYTHON_IN_VENV) -m mypy
 
 # Did a change make it worse? Against evaluation/accepted.json; docs/check_a_change.md.
+regression: OUT = results/regression
 regression: $(READY)
-	rm -rf results/regression
-	.venv/bin/airground reproduce --suite fast --out results/regression
-	.venv/bin/airground check results/regression
+	rm -rf $(OUT)
+	.venv/bin/airground reproduce --suite fast --out $(OUT)
+	.venv/bin/airground check $(OUT)
 
 format: $(READY)
 	$(PYTHON_IN_VENV) -m ruff format .
