@@ -143,15 +143,16 @@ def test_a_viewer_that_is_closed_meanwhile_leaves_the_file_whole(tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    ("words", "alone", "realtime", "complaint"),
+    ("words", "alone", "realtime", "own", "complaint"),
     [
-        (LookWords(rerun_level="all"), False, False, "only with --rerun"),
-        (LookWords(rerun=True), True, False, "leave --only out"),
-        (LookWords(rerun_live=True), False, True, "--drops"),
+        (LookWords(rerun_level="all"), False, False, False, "only with --rerun"),
+        (LookWords(rerun=True), True, False, False, "leave --only out"),
+        (LookWords(rerun_live=True), False, True, False, "--drops"),
+        (LookWords(rerun=True), False, False, True, "that simulate has written"),
     ],
 )
 def test_words_without_a_meaning_are_refused(
-    words: LookWords, alone: bool, realtime: bool, complaint: str
+    words: LookWords, alone: bool, realtime: bool, own: bool, complaint: str
 ) -> None:
     with pytest.raises(InputError, match=complaint):
-        words.check_look_words(alone, realtime)
+        words.check_look_words(alone, realtime, own)
