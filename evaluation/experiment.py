@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import resource
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,7 +13,8 @@ import numpy as np
 from airground.io.recording import Recording
 from evaluation.baselines.measure import add_baselines
 from evaluation.error_budget import add_error_budget
-from evaluation.mapping_pass import Maps, map_recording
+from evaluation.mapping_pass import GroundPass, Maps, map_ground, map_recording
+from evaluation.negatives import add_negatives
 from evaluation.results import Row
 from evaluation.row_writer import RowWriter
 from evaluation.setups import Setup
@@ -21,7 +24,7 @@ from evaluation.surface_error import surface_error
 from evaluation.timing import STAGE_OF
 from evaluation.tracking_quality import add_tracking
 from evaluation.trials import (
-    SEQUENCE_LENGTH,
+    Protocol,
     localize_sequence,
     refine_sighting,
     sequence_starts,
@@ -29,23 +32,6 @@ from evaluation.trials import (
 )
 from sim.rendered import Flight, rendered
 from sim.truth import Truth
-
-
-@dataclass(frozen=True)
-class Protocol:
-    """How much is measured on each recording.
-
-    Attributes:
-        sequences: Sequences of aerial maps, spread evenly over the flight.
-        trials: Refinements from a noisy start, likewise.
-        baselines: How many of these trials every baseline is tried on as well.
-        sequence_length: Aerial maps in a sequence.
-    """
-
-    sequences: int = 7
-    trials: int = 12
-    baselines: int = 0
-    sequence_length: int = SEQUENCE_LENGTH
 
 
 @dataclass(frozen=True)
@@ -61,6 +47,8 @@ class Task:
         budget: Whether to measure what each stage loses, with the first setup.
         renderers: Processes that draw images on the fly.
         baselines: Whether to try the baselines on the first setup's maps.
+        negatives: Whether to try the negative cases, likewise.
+        stranger: The flight whose ground map is the wrong one there; None leaves that out.
     """
 
     recording: Path | Flight
@@ -72,6 +60,8 @@ class Task:
     budget: bool = False
     renderers: int = 1
     baselines: bool = False
+    negatives: bool = False
+    stranger: Path | Flight | None = None
 
 
 @dataclass(frozen=True)
@@ -94,13 +84,30 @@ class Outcome:
 
 def run_task(task: Task) -> Outcome:
     """Measure everything that a task asks for."""
-    if isinstance(task.recording, Flight):
-        with rendered(task.recording, task.renderers) as recording:
-            return _measured(recording, task)
-    return _measured(Recording.open(task.recording), task)
+    stranger = _stranger(task)
+    with _opened(task.recording, task.renderers) as recording:
+        return _measured(recording, task, stranger)
 
 
-def _measured(recording: Recording, task: Task) -> Outcome:
+@contextmanager
+def _opened(recording: Path | Flight, renderers: int) -> Iterator[Recording]:
+    """From the disk, or drawn while it is read."""
+    if isinstance(recording, Flight):
+        with rendered(recording, renderers) as drawn:
+            yield drawn
+    else:
+        yield Recording.open(recording)
+
+
+def _stranger(task: Task) -> GroundPass | None:
+    """The map that is the wrong one for all of the task's sightings."""
+    if task.stranger is None:
+        return None
+    with _opened(task.stranger, task.renderers) as recording:
+        return map_ground(recording, Truth.open(recording.path), task.setups[0], task.seed)
+
+
+def _measured(recording: Recording, task: Task, stranger: GroundPass | None) -> Outcome:
     truth = Truth.open(recording.path)
     maps = map_recording(recording, truth, task.setups[0], task.seed)
     parts: list[list[Row]] = []
@@ -117,6 +124,9 @@ def _measured(recording: Recording, task: Task) -> Outcome:
             counts = (task.protocol.trials, task.protocol.baselines)
             seed = (task.seed, task.flight)
             add_baselines(out, recording, truth, setup.config, maps, seed, counts)
+        if task.negatives and setup is task.setups[0]:
+            seed = (task.seed, task.flight)
+            add_negatives(out, maps, stranger, truth, setup.config, seed, task.protocol)
         parts.append(out.rows)
     showcase = None
     if task.showcase:
@@ -166,7 +176,8 @@ def _add_sequences(out: RowWriter, maps: Maps, truth: Truth, setup: Setup, task:
             out.add("timing", STAGE_OF[type(event)], duration_ms, "ms")
             if result is not None:
                 iteration += 1
-                out.add_belief(result.belief, result.error, sequence, iteration)
+                distance = result.squared_mahalanobis
+                out.add_belief(result.belief, result.error, distance, sequence, iteration)
         for missing in range(iteration + 1, length + 1):
             out.add_no_belief("the flight gave no further aerial map", sequence, missing)
 

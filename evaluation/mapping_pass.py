@@ -9,12 +9,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from airground.core.cloud import PointCloud, Source
 from airground.core.events import (
     DepthMapMade,
     Event,
     FieldAdded,
     SurfaceCast,
 )
+from airground.core.se3 import SE3
 from airground.core.surface import DepthMap
 from airground.io.recording import Recording
 from airground.pipeline import Mapping, Sighting, sight
@@ -44,6 +46,19 @@ class Maps:
     durations_ms: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     tracked: dict[str, Tracked] = field(default_factory=dict)
     processing_s: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class GroundPass:
+    """What a ground robot mapped on its own.
+
+    Attributes:
+        cloud_ground: Its map at the end.
+        T_ground_camera: Where its camera was at last.
+    """
+
+    cloud_ground: PointCloud
+    T_ground_camera: SE3
 
 
 def map_recording(recording: Recording, truth: Truth, setup: Setup, seed: int) -> Maps:
@@ -76,6 +91,26 @@ def map_recording(recording: Recording, truth: Truth, setup: Setup, seed: int) -
     maps.processing_s = time.perf_counter() - started
     maps.tracked = watched.tracked()
     return maps
+
+
+def map_ground(recording: Recording, truth: Truth, setup: Setup, seed: int) -> GroundPass | None:
+    """Run the ground robot's part of Figure 4 over a whole recording.
+
+    Returns:
+        What it left, or None where the robot never knew where it was.
+    """
+    watched = front_ends_for(setup, recording, truth, np.random.default_rng([seed, 0]))
+    trackers = Trackers(recording.mav, recording.ground, watched.front_ends())
+    mapping = Mapping(setup.config, recording.mav, recording.ground)
+    # The MAV sees nothing, and so costs nothing.
+    blind = {Source.MAV: recording.mav_camera_stamps.tolist()}
+    for _ in _events(trackers.frames(recording.messages(blind)), mapping):
+        pass
+    mapping.correct_ground(trackers.finish())
+    live = watched.ground.live_poses()
+    if not live:
+        return None
+    return GroundPass(mapping.ground_cloud(), live[-1][1])
 
 
 def _events(frames: Iterable[TrackedFrame], mapping: Mapping) -> Iterator[Event]:

@@ -10,8 +10,11 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from airground.core.belief import Belief
 from airground.core.se3 import SE3
+from airground.pipeline import Sighting
 from sim.truth import Truth
 
 
@@ -61,3 +64,26 @@ def pose_error(T_ground_mav: SE3, poses: BothPoses, truth: Truth) -> PoseError:
         float(np.linalg.norm(off)),
         float(np.rad2deg((true.inverse() @ estimate).angle())),
     )
+
+
+def squared_mahalanobis(belief: Belief, sighting: Sighting, truth: Truth) -> float:
+    """How many standard deviations, squared, the truth lies from what a belief reports.
+
+    It is told where the particles live: at the camera that the surface was seen from.
+
+    Returns:
+        d^T P^-1 d of the horizontal error d and the particles' covariance P; infinite where
+        they are all in one line or place, so that they leave nothing else possible.
+    """
+    position_mav = sighting.surface.T_mav_camera.translation
+    true_position = true_T_ground_mav(sighting, truth) @ position_mav
+    return distance_in(belief.covariance, belief.estimate[:2] - true_position[:2])
+
+
+def distance_in(covariance: ArrayLike, error: ArrayLike) -> float:
+    """Squared Mahalanobis distance of an error (2,) [m] in a covariance (2, 2) [m^2]."""
+    matrix, difference = np.asarray(covariance, np.float64), np.asarray(error, np.float64)
+    eigenvalues = np.linalg.eigvalsh(matrix)
+    if not eigenvalues[0] > np.finfo(np.float64).eps * max(eigenvalues[1], 1.0):
+        return float("inf")
+    return float(difference @ np.linalg.solve(matrix, difference))

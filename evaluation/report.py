@@ -16,6 +16,7 @@ from evaluation.figures.style import save_figure
 from evaluation.headline import headlines
 from evaluation.report_baselines import baseline_table
 from evaluation.report_budget import budget_table
+from evaluation.report_calibration import calibration_table, claims_table
 from evaluation.report_failures import control_table, failure_table
 from evaluation.report_figures import report_figures
 from evaluation.report_live import live_table
@@ -81,6 +82,8 @@ def write_report(
         trajectories=trajectory_table(table, shown),
         budget=budget_table(measured),
         baselines=baseline_table(primary),
+        claims=claims_table(primary),
+        calibration=calibration_table(measured),
         timing=timing_table(measured),
         live=live_table(measured),
         by_scene=scene_table(primary),

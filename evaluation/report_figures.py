@@ -17,6 +17,7 @@ from evaluation.figures.fig14_refinement_angle import refinement_angle_figure
 from evaluation.figures.style import SERIES
 from evaluation.figures.table1_timing import timing_figure
 from evaluation.report_budget import budget_figure
+from evaluation.report_calibration import calibration_figures
 from evaluation.report_trajectories import trajectory_figures
 from evaluation.results import Condition, ResultTable, shared_parts, short_labels
 from evaluation.showcase import Showcase
@@ -46,6 +47,7 @@ def report_figures(
     if conditions[0].poses != "oracle exact":
         yield from trajectory_figures(drawn[0].table, conditions[0])
     yield from _localization(drawn)
+    yield from calibration_figures(drawn[0].table, conditions[0])
     yield from _refinement(drawn)
     yield from budget_figure(drawn[0].table, conditions[0])
     yield from _timing(drawn[0])

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
+from types import MappingProxyType
 
-from evaluation.experiment import Protocol
 from evaluation.results import CONTROL_SCENES, SEQUENCE_KEYS, ResultTable
 from evaluation.setups import Setup
 from evaluation.showcase import Showcase
+from evaluation.trials import Protocol
 from evaluation.units.crew import Crew
 from evaluation.units.measure import measure
-from evaluation.units.recordings import recorded
+from evaluation.units.recordings import recorded, recording_name
 from evaluation.units.store import Finished, UnitStore
 from evaluation.units.unit import Unit, grouped
 from sim.presets import SensorPreset
 from sim.rendered import Flight
 from sim.scene import Scene
+
+NOTHING: Mapping[str, Path] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -104,30 +107,54 @@ class Plan:
             finished += self._flown(flights, recordings, store, crew)
         return Findings.of(finished)
 
-    def units(self, flight: Flight, recording: Path | None = None) -> list[Unit]:
-        """What is measured on one flight, drawn on the fly where there is no recording."""
-        return [
-            Unit(
-                recording or flight,
-                flight.seed,
-                flight.flight,
-                setup,
-                self.protocol,
-                showcase=setup is self.setups[0] and flight == self.first_flights()[0],
-                budget=self.budget and setup is self.setups[0],
-                baselines=setup is self.setups[0] and self.protocol.baselines > 0,
-            )
+    def stranger(self, flight: Flight) -> Flight | None:
+        """Whose ground map is the wrong one for a flight: the same flight over the next scene.
+
+        None where no other scene holds anything to find.
+        """
+        places = [scene for scene in self.scenes if scene.name not in CONTROL_SCENES]
+        here = places.index(flight.scene)
+        others = (scene for scene in places[here:] + places[:here] if scene != flight.scene)
+        other = next(others, None)
+        return None if other is None else replace(flight, scene=other)
+
+    def units(self, flight: Flight, recordings: Mapping[str, Path] = NOTHING) -> list[Unit]:
+        """What is measured on one flight, that of the primary setup first.
+
+        Args:
+            flight: Which one.
+            recordings: By the flights' `recording_name`; others are drawn on the fly.
+        """
+
+        def where(of: Flight) -> Path | Flight:
+            return recordings.get(recording_name(of), of)
+
+        units = [
+            Unit(where(flight), flight.seed, flight.flight, setup, self.protocol)
             for setup in self.setups
         ]
+        first_flights = self.first_flights()
+        # Flights that follow bring more sequences, and nothing else.
+        negatives = flight in first_flights and flight.scene.name not in CONTROL_SCENES
+        stranger = self.stranger(flight) if negatives else None
+        units[0] = replace(
+            units[0],
+            showcase=flight == first_flights[0],
+            budget=self.budget,
+            baselines=self.protocol.baselines > 0,
+            negatives=negatives,
+            stranger=None if stranger is None else where(stranger),
+        )
+        return units
 
     def _flown(
         self, flights: list[Flight], recordings: Path | None, store: UnitStore, crew: Crew
     ) -> list[Finished]:
         """The units of each flight, those of the primary setup first."""
-        paths: Sequence[Path | None] = [None] * len(flights)
+        made: dict[str, Path] = {}
         if recordings is not None:
-            paths = recorded(flights, recordings, crew)
-        units = [self.units(flight, path) for flight, path in zip(flights, paths, strict=True)]
+            made = {path.name: path for path in recorded(flights, recordings, crew)}
+        units = [self.units(flight, made) for flight in flights]
         return measure([unit for of_flight in units for unit in of_flight], store, crew)
 
 

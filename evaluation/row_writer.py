@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from airground.core.belief import Alignment, Belief
+from evaluation import calibration
 from evaluation.relation import PoseError
 from evaluation.results import Condition, Row
 
@@ -53,11 +54,19 @@ class RowWriter:
             )
         )
 
-    def add_belief(self, belief: Belief, error: PoseError, sequence: int, iteration: int) -> None:
+    def add_belief(
+        self,
+        belief: Belief,
+        error: PoseError,
+        squared_mahalanobis: float,
+        sequence: int,
+        iteration: int,
+    ) -> None:
         """What a filter says after one aerial map, and how far off it is (Fig. 11, 12)."""
         for metric, value, unit in (
             ("error_m", error.horizontal_m, "m"),
             ("spread_m", belief.spread_m, "m"),
+            (calibration.METRIC, squared_mahalanobis, ""),
             ("converged", belief.converged, ""),
         ):
             note = belief.refusal if metric == "converged" else ""

@@ -30,7 +30,7 @@ from evaluation.experiment import peak_memory_mib
 from evaluation.front_ends import front_ends_for
 from evaluation.onlooker import Onlooker, Seen
 from evaluation.realtime.drops import DropList, nothing_dropped
-from evaluation.relation import pose_error
+from evaluation.relation import pose_error, squared_mahalanobis
 from evaluation.results import ResultTable
 from evaluation.row_writer import RowWriter
 from evaluation.setups import Setup
@@ -218,7 +218,8 @@ class Measure:
         self._iterations += 1
         assert self._sighting is not None
         error = pose_error(belief.T_ground_mav, self._sighting, self._truth)
-        self.out.add_belief(belief, error, 0, self._iterations)
+        distance = squared_mahalanobis(belief, self._sighting, self._truth)
+        self.out.add_belief(belief, error, distance, 0, self._iterations)
 
     def _take_alignment(self, event: Aligned, duration_ms: float) -> None:
         alignment = event.alignment

@@ -5,6 +5,7 @@ from __future__ import annotations
 from rich.console import Console
 from rich.table import Table
 
+from evaluation.claims import ALL
 from evaluation.realtime.live_summary import LiveSummary
 from evaluation.report_live import live_rows
 from evaluation.summary import Summary
@@ -55,11 +56,23 @@ def _rows(summary: Summary) -> list[tuple[str, str, str]]:
         ("refined, median position", _millimetres(after.translation_m.median), "76 mm"),
         ("refined, median angle", _text(after.rotation_deg.median, "{:.2f}°"), "3.0°"),
         ("refined within 5 cm and 2°", _percent(refinement.within_5cm_2deg), "-"),
+        *_claims(summary),
         ("fused surface, median error", _millimetres(summary.surface.error_median_m), "-"),
         ("fused surface, completeness", _percent(summary.surface.completeness), "-"),
         ("recorded s / processing s", _text(summary.real_time_factor, "{:.2f}"), "real time"),
     ]
     return rows
+
+
+def _claims(summary: Summary) -> list[tuple[str, str, str]]:
+    """Over all cases, those without a place to find included."""
+    every = summary.claims.localization.get(ALL) if summary.claims is not None else None
+    if every is None:
+        return []
+    return [
+        ("localizations that claim a place", _percent(every.accepted.share), "-"),
+        ("wrong among them, all cases", _percent(every.wrong.share), "-"),
+    ]
 
 
 def _text(value: float | None, form: str) -> str:

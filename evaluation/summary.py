@@ -10,37 +10,36 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from airground.errors import InputError
+from evaluation.calibration_summary import (
+    CalibrationSummary,
+    ClaimsSummary,
+    calibration_summary,
+    claims_summary,
+)
 from evaluation.checked_json import read_checked
 from evaluation.published import TABLE_I
 from evaluation.realtime.live_summary import LiveSummary, live_summary
 from evaluation.results import Condition, ResultTable
 from evaluation.run_info import RunInfo
 from evaluation.statistics import quantile, quantiles, rate_within, wilson, with_failures
+from evaluation.summary_parts import Count, Number, Part, Share, number
 
 SCHEMA: Literal[1] = 1
 
-Share = Annotated[float, Field(ge=0, le=1)]
-Number = Annotated[float, Field(allow_inf_nan=False)] | None
-Count = Annotated[int, Field(ge=0)]
 
-
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
-
-
-class Machine(_Part):
+class Machine(Part):
     cpu: str
     cores: Count
 
 
-class SlamRobot(_Part):
+class SlamRobot(Part):
     """Medians over the runs; `ate` is of live poses, `final_ate` of those believed at the end.
 
     Scale errors are absolute. `worst` is the largest over the runs, null where one run has no
@@ -66,12 +65,12 @@ class SlamRobot(_Part):
     within_95_pose: Number = None
 
 
-class Slam(_Part):
+class Slam(Part):
     mav: SlamRobot
     ground: SlamRobot
 
 
-class Surface(_Part):
+class Surface(Part):
     """Medians over the fused surfaces of each one's median, 90th percentile, completeness."""
 
     error_median_m: Number
@@ -79,7 +78,7 @@ class Surface(_Part):
     completeness: Number
 
 
-class QuantileLists(_Part):
+class QuantileLists(Part):
     """One entry per iteration."""
 
     median: list[Number]
@@ -88,7 +87,7 @@ class QuantileLists(_Part):
     p95: list[Number]
 
 
-class Localization(_Part):
+class Localization(Part):
     sequences: Count
     iterations: Count
     error_m: QuantileLists
@@ -106,33 +105,33 @@ class Localization(_Part):
         return self
 
 
-class QuantileValues(_Part):
+class QuantileValues(Part):
     median: Number
     q25: Number
     q75: Number
     p95: Number
 
 
-class PoseErrors(_Part):
+class PoseErrors(Part):
     translation_m: QuantileValues
     rotation_deg: QuantileValues
 
 
-class Refinement(_Part):
+class Refinement(Part):
     trials: Count
     before: PoseErrors
     after: PoseErrors
     within_5cm_2deg: Share | None
 
 
-class Timing(_Part):
+class Timing(Part):
     mean: Number
     median: Number
     p95: Number
     n: Count
 
 
-class TimingTable(_Part):
+class TimingTable(Part):
     mono_slam: Timing
     rgbd_slam: Timing
     add_frame: Timing
@@ -144,7 +143,7 @@ class TimingTable(_Part):
     icp: Timing
 
 
-class Summary(_Part):
+class Summary(Part):
     """Everything `summary.json` holds (DESIGN.md, "What a run leaves")."""
 
     schema_: Literal[1] = Field(alias="schema")
@@ -162,6 +161,8 @@ class Summary(_Part):
     timing_ms: TimingTable
     real_time_factor: Number
     realtime: LiveSummary | None = None
+    claims: ClaimsSummary | None = None
+    calibration: CalibrationSummary | None = None
 
     def write(self, path: Path) -> None:
         text = json.dumps(self.model_dump(by_alias=True), indent=2, allow_nan=False)
@@ -178,12 +179,13 @@ class Summary(_Part):
 
 
 def build_summary(table: ResultTable, condition: Condition, run: RunInfo) -> Summary:
-    """Sum up what was measured under one condition (control scenes apart).
+    """Sum up what was measured under one condition (control scenes apart, but for claims).
 
     Raises:
         InputError: The table has no row under this condition.
     """
-    measured = table.of(condition).without_controls()
+    of_condition = table.of(condition)
+    measured = of_condition.without_controls()
     if len(measured) == 0:
         raise InputError(f"results: nothing was measured with {condition.label()}")
     return Summary(
@@ -202,6 +204,8 @@ def build_summary(table: ResultTable, condition: Condition, run: RunInfo) -> Sum
         timing_ms=_timing(measured),
         real_time_factor=real_time_factor(measured),
         realtime=live_summary(measured),
+        claims=claims_summary(of_condition),
+        calibration=calibration_summary(measured),
     )
 
 
@@ -236,9 +240,9 @@ def _slam_robot(table: ResultTable, robot: str) -> SlamRobot:
         if name.endswith("scale_error"):
             values = np.abs(values)
         if name.startswith("worst_"):
-            made[name] = _number(quantile(values, 1.0))
+            made[name] = number(quantile(values, 1.0))
         elif name.startswith("least_"):
-            made[name] = _number(quantile(values, 0.0))
+            made[name] = number(quantile(values, 0.0))
         else:
             made[name] = _median(values)
     return SlamRobot(**made)
@@ -289,26 +293,22 @@ def _timing(table: ResultTable) -> TimingTable:
             spread = quantiles(values)
             entries[stage.metric] = Timing(
                 mean=float(values.mean()) if len(values) else None,
-                median=_number(spread.median),
-                p95=_number(spread.p95),
+                median=number(spread.median),
+                p95=number(spread.p95),
                 n=len(values),
             )
     return TimingTable(**entries)
 
 
 def _values(values: ArrayLike) -> QuantileValues:
-    return QuantileValues(**{k: _number(v) for k, v in asdict(quantiles(values)).items()})
+    return QuantileValues(**{k: number(v) for k, v in asdict(quantiles(values)).items()})
 
 
 def _lists(columns: list[ArrayLike]) -> QuantileLists:
     spreads = [asdict(quantiles(column)) for column in columns]
     names = QuantileLists.model_fields
-    return QuantileLists(**{name: [_number(s[name]) for s in spreads] for name in names})
+    return QuantileLists(**{name: [number(s[name]) for s in spreads] for name in names})
 
 
 def _median(values: ArrayLike) -> float | None:
-    return _number(quantiles(with_failures(values)).median)
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+    return number(quantiles(with_failures(values)).median)

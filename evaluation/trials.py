@@ -15,7 +15,7 @@ from airground.core.se3 import SE3
 from airground.localization.particle_filter import MonteCarloLocalizer
 from airground.pipeline import Sighting, locate
 from airground.refinement import refine
-from evaluation.relation import PoseError, pose_error, true_T_ground_mav
+from evaluation.relation import PoseError, pose_error, squared_mahalanobis, true_T_ground_mav
 from evaluation.timing import timed
 from sim.truth import Truth
 
@@ -27,11 +27,35 @@ START_NOISE_M, START_NOISE_DEG = 0.2, 3.0
 
 
 @dataclass(frozen=True)
+class Protocol:
+    """How much is measured on each recording.
+
+    Attributes:
+        sequences: Sequences of aerial maps, spread evenly over the flight.
+        trials: Refinements from a noisy start, likewise.
+        baselines: How many of these trials every baseline is tried on as well.
+        sequence_length: Aerial maps in a sequence.
+    """
+
+    sequences: int = 7
+    trials: int = 12
+    baselines: int = 0
+    sequence_length: int = SEQUENCE_LENGTH
+
+
+@dataclass(frozen=True)
 class Iteration:
-    """One aerial map taken in by one sequence."""
+    """One aerial map taken in by one sequence.
+
+    Attributes:
+        belief: What the filter says then.
+        error: How far off that is.
+        squared_mahalanobis: The same in its own measure (`evaluation.calibration`).
+    """
 
     belief: Belief
     error: PoseError
+    squared_mahalanobis: float
 
 
 @dataclass(frozen=True)
@@ -82,7 +106,8 @@ def localize_sequence(
             iteration = None
             if isinstance(event, BeliefUpdated):
                 error = pose_error(event.belief.T_ground_mav, sighting, truth)
-                iteration = Iteration(event.belief, error)
+                distance = squared_mahalanobis(event.belief, sighting, truth)
+                iteration = Iteration(event.belief, error, distance)
             yield event, duration_ms, iteration
 
 

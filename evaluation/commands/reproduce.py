@@ -117,9 +117,9 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, Cluste
 
     def plan(self) -> Plan:
         """What the words ask for, checked."""
-        from evaluation.experiment import Protocol
         from evaluation.reproduce import Plan
         from evaluation.setups import with_companions
+        from evaluation.trials import Protocol
         from sim.presets import sensor_preset
         from sim.scene import load_scene
 

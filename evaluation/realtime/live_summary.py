@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
 
 from evaluation.results import ResultTable
 from evaluation.statistics import quantile
+from evaluation.summary_parts import Count, Number, Part, number
 
 STAGE = "realtime"
 """Of all rows that tell how a live run went."""
@@ -17,15 +15,8 @@ STAGE = "realtime"
 DEADLINE_MS = 100.0
 """A pose that comes later than this after its image counts as a deadline missed."""
 
-Number = Annotated[float, Field(allow_inf_nan=False)] | None
-Count = Annotated[int, Field(ge=0)]
 
-
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Latency(_Part):
+class Latency(Part):
     """From the moment when an image was due [ms]."""
 
     median: Number
@@ -36,11 +27,11 @@ class Latency(_Part):
     @classmethod
     def of(cls, values_ms: NDArray[np.float64]) -> Latency:
         levels = (0.5, 0.95, 1.0)
-        median, p95, worst = (_number(quantile(values_ms, level)) for level in levels)
+        median, p95, worst = (number(quantile(values_ms, level)) for level in levels)
         return cls(median=median, p95=p95, worst=worst, n=len(values_ms))
 
 
-class LiveRobot(_Part):
+class LiveRobot(Part):
     """One robot; counts are sums and the rest maxima over the runs.
 
     Attributes:
@@ -72,7 +63,7 @@ class LiveRobot(_Part):
     peak_memory_mib: Number
 
 
-class LiveSummary(_Part):
+class LiveSummary(Part):
     """How the runs with --realtime went.
 
     Attributes:
@@ -138,7 +129,3 @@ def _robot(table: ResultTable, name: str) -> LiveRobot:
 def _most(table: ResultTable, metric: str) -> float | None:
     values = table.values(STAGE, metric)
     return float(values.max()) if len(values) else None
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

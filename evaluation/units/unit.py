@@ -11,8 +11,9 @@ from typing import Any
 from airground.errors import InputError
 from airground.io import layout
 from airground.io.digests import bytes_digest, file_digest
-from evaluation.experiment import Protocol, Task
+from evaluation.experiment import Task
 from evaluation.setups import Setup
+from evaluation.trials import Protocol
 from evaluation.units.code_version import code_version
 from sim.rendered import Flight
 
@@ -32,6 +33,9 @@ class Unit:
         showcase: Whether to gather what pictures need.
         budget: Whether to measure what each stage loses.
         baselines: Whether to try the baselines.
+        negatives: Whether to try the cases in which there is nothing to find.
+        stranger: The recording whose ground map is the wrong one there, or what it would be made
+            from; None leaves that case out.
     """
 
     recording: Path | Flight
@@ -42,6 +46,8 @@ class Unit:
     showcase: bool = False
     budget: bool = False
     baselines: bool = False
+    negatives: bool = False
+    stranger: Path | Flight | None = None
 
     def made_from(self) -> dict[str, Any]:
         """Everything that its rows depend on, as JSON can hold it.
@@ -63,6 +69,8 @@ class Unit:
             "showcase": self.showcase,
             "budget": self.budget,
             "baselines": self.baselines,
+            "negatives": self.negatives,
+            "stranger": None if self.stranger is None else _described(self.stranger),
         }
 
     def key(self) -> str:
@@ -72,7 +80,7 @@ class Unit:
     @property
     def has_extras(self) -> bool:
         """Whether it asks for what a task does for the first of its setups alone."""
-        return self.showcase or self.budget or self.baselines
+        return self.showcase or self.budget or self.baselines or self.negatives
 
     def maps_like(self, other: Unit) -> bool:
         """Whether one pass of mapping serves both."""
@@ -117,6 +125,8 @@ def task_of(group: list[Unit], renderers: int) -> Task:
         budget=first.budget,
         renderers=renderers,
         baselines=first.baselines,
+        negatives=first.negatives,
+        stranger=first.stranger,
     )
 
 

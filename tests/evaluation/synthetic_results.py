@@ -50,6 +50,8 @@ def make_table(
             for flight in range(2):
                 rows += _flight(rng, condition, scene, flight, success, sequences)
         rows += _flight(rng, condition, "flat", 0, 0.0, 3, claims=False)
+        if condition == BEST:
+            rows += [row for scene in SCENES for row in _negatives(condition, scene)]
     return ResultTable.from_rows(rows)
 
 
@@ -98,6 +100,7 @@ def _flight(
             note = "" if converged else "particles are spread over more than 0.15 m"
             add("localization", "error_m", error, "m", **where)
             add("localization", "spread_m", spread, "m", **where)
+            add("localization", "squared_mahalanobis", 2 * (error / spread) ** 2, "", **where)
             add("localization", "converged", converged, "", **where, note=note)
     for trial in range(12):
         fails = rng.random() < 0.03
@@ -115,6 +118,20 @@ def _flight(
             add("refinement", f"{name}_rotation_deg", degrees, "deg", trial=trial)
         note = "only 21 % of the aerial points lie on the ground map (at least 35 %)"
         add("refinement", "accepted", not fails, "", trial=trial, note=note if fails else "")
+    return rows
+
+
+def _negatives(condition: Condition, scene: str) -> list[Row]:
+    """Cases without a place to find: of 24 localizations one is claimed, of 3 refinements none."""
+    rows = []
+    for stage in ("no_overlap", "wrong_map"):
+        for sequence in range(2):
+            for iteration in range(1, 13):
+                claimed = float(stage == "wrong_map" and sequence == 1 and iteration == 12)
+                where = (scene, 7, 0, condition, stage)
+                rows.append(Row(*where, "converged", claimed, "", sequence, iteration))
+        for trial in range(3):
+            rows.append(Row(scene, 7, 0, condition, stage, "accepted", 0.0, "", trial=trial))
     return rows
 
 

@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 
 from airground.config import Config
-from evaluation.experiment import Protocol, Task, run_task
+from evaluation.experiment import Task, run_task
 from evaluation.results import CLOCK_STAGES, Row
 from evaluation.setups import Setup
+from evaluation.trials import Protocol
 from sim.presets import NOMINAL
 from sim.recorder import record
 from sim.rendered import Flight
@@ -26,8 +27,10 @@ def test_results_are_those_from_disk(tmp_path: Path) -> None:
     scene = parse_scene(SCENE, "small.toml").model_copy(update={"duration_s": 7.0})
     flight = Flight(scene, 3, 0, NOMINAL)
     path = record(scene, 3, NOMINAL, tmp_path / "recording", workers=1)
-    task = Task(path, 3, 0, [Setup(Config(), "oracle")], Protocol(1, 2))
+    setups = [Setup(Config(), "oracle")]
+    task = Task(path, 3, 0, setups, Protocol(1, 2), negatives=True, stranger=path)
     stored = run_task(task)
-    drawn = run_task(replace(task, recording=flight))
-    assert len([row for row in stored.rows if row.stage == "surface"]) > 0
+    drawn = run_task(replace(task, recording=flight, stranger=flight))
+    for stage in ("surface", "no_overlap", "wrong_map"):
+        assert len([row for row in stored.rows if row.stage == stage]) > 0
     assert measured(drawn.rows) == measured(stored.rows)

@@ -53,6 +53,7 @@ def test_every_figure_is_embedded_and_saved(page: tuple[Path, str]) -> None:
     saved = sorted(path.stem for path in (out / "figures").glob("*.png"))
     assert saved == sorted(path.stem for path in (out / "figures").glob("*.pdf"))
     assert saved == [
+        "calibration",
         "fig11_localization_error",
         "fig12_spread",
         "fig13_refinement_translation",
@@ -91,6 +92,15 @@ def test_the_comparison_has_a_column_for_the_paper_and_each_condition(table: Res
     good = int((errors <= 0.25).sum())
     assert f"{good} of {len(errors)};" in cells["within 0.25 m after 4"][3]
     assert cells["refined, median"][1] == "76 mm, 3.0°"
+
+
+def test_claims_and_calibration_have_their_sections(page: tuple[Path, str]) -> None:
+    _, html = page
+    for anchor in ("claims", "calibration_table", "calibration"):
+        assert html.count(f'id="{anchor}"') == 1
+    assert html.count('href="#claims"') == html.count('href="#calibration_table"') == 1
+    assert "another scene&#39;s ground map" in html
+    assert "true position in the 90 % ellipse" in html
 
 
 def test_what_nobody_measured_has_no_row(table: ResultTable) -> None:

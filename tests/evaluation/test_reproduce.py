@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 from airground.config import Config
 from evaluation import reproduce as module
 from evaluation.commands.reproduce import Reproduce
-from evaluation.experiment import Protocol
 from evaluation.reproduce import Plan
 from evaluation.results import ResultTable, Row
 from evaluation.setups import Setup, with_companions
+from evaluation.trials import Protocol
 from evaluation.units.crew import Crew
+from evaluation.units.recordings import recording_name
 from evaluation.units.store import Finished, UnitStore
 from evaluation.units.unit import Unit
 from sim.presets import NOMINAL
@@ -94,6 +95,41 @@ def test_only_the_primary_setups_sequences_count() -> None:
 
 def test_nothing_can_be_counted_over_control_scenes_alone() -> None:
     assert len(flown_for(30, ("flat",), 2)[0]) == 2
+
+
+def plan_of(*scenes: str, flights: int = 2) -> Plan:
+    setups = with_companions(Setup(Config()))[:2]
+    return Plan([load_scene(name) for name in scenes], flights, setups, NOMINAL, Protocol(), 5)
+
+
+def test_the_wrong_map_is_that_of_the_same_flight_over_the_next_scene() -> None:
+    plan = plan_of("indoor_a", "flat", "indoor_b", "tiny")
+    strangers = {}
+    for flight in plan.first_flights():
+        if flight.scene.name != "flat":
+            stranger = plan.stranger(flight)
+            assert stranger is not None
+            assert (stranger.seed, stranger.flight) == (5, flight.flight)
+            strangers[flight.scene.name] = stranger.scene.name
+    assert strangers == {"indoor_a": "indoor_b", "indoor_b": "tiny", "tiny": "indoor_a"}
+    alone = plan_of("tiny", "flat")
+    assert alone.stranger(alone.first_flights()[0]) is None
+
+
+def test_negatives_are_tried_on_the_primary_setup_of_flights_with_something_to_find() -> None:
+    plan = plan_of("tiny", "indoor_a", "flat", flights=1)
+    tiny, indoor, flat = plan.first_flights()
+    recordings = {recording_name(indoor): Path("there")}
+    primary, companion = plan.units(tiny, recordings)
+    assert (primary.recording, primary.negatives, primary.stranger) == (tiny, True, Path("there"))
+    assert (companion.negatives, companion.stranger) == (False, None)
+    assert plan.units(indoor, recordings)[0].stranger == tiny
+    further = next(plan.further_flights())
+    for flight in (flat, further):
+        assert [(unit.negatives, unit.stranger) for unit in plan.units(flight)] == [
+            (False, None),
+            (False, None),
+        ]
 
 
 def test_the_words_say_how_much(tmp_path: Path) -> None:

@@ -101,7 +101,8 @@ def measure(flown: Sequence[Flown]) -> Measured:
             for _, _, result in steps:
                 if result is not None:
                     iteration += 1
-                    out.add_belief(result.belief, result.error, sequence, iteration)
+                    distance = result.squared_mahalanobis
+                    out.add_belief(result.belief, result.error, distance, sequence, iteration)
         rows += out.rows
     return Measured.of(ResultTable.from_rows(rows))
 

@@ -11,7 +11,6 @@ import pytest
 from rich.console import Console
 
 from airground.config import Config
-from evaluation.experiment import Protocol
 from evaluation.figures.sweep_curves import sweep_figure
 from evaluation.results import ResultTable, Row
 from evaluation.setups import Setup
@@ -21,6 +20,7 @@ from evaluation.sweep.findings import Measured, sweep, write_sweep
 from evaluation.sweep.plan import SweepPlan
 from evaluation.sweep.screen import print_sweep
 from evaluation.sweep.vary import parse_vary
+from evaluation.trials import Protocol
 from evaluation.units.crew import Crew
 from evaluation.units.store import Finished, UnitStore
 from evaluation.units.unit import Unit

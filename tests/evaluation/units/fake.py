@@ -8,9 +8,10 @@ import time
 from pathlib import Path
 
 from airground.config import Config
-from evaluation.experiment import Outcome, Protocol
+from evaluation.experiment import Outcome
 from evaluation.results import Row
 from evaluation.setups import Setup, with_localization
+from evaluation.trials import Protocol
 from evaluation.units.measure import Refused, Sent
 from evaluation.units.unit import Unit
 

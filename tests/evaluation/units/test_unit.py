@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from airground.config import Config, MonocularSlam
 from airground.errors import InputError
-from evaluation.experiment import Protocol
 from evaluation.oracle import PoseNoise
 from evaluation.setups import Setup, with_localization
+from evaluation.trials import Protocol
 from evaluation.units import unit as module
 from evaluation.units.unit import Unit, grouped, key_of, task_of
 from sim.presets import HARSH, NOMINAL, with_heading_error, with_noise
@@ -56,6 +56,11 @@ OTHERS: dict[str, list[Unit]] = {
     "showcase": [replace(UNIT, showcase=True)],
     "budget": [replace(UNIT, budget=True)],
     "baselines": [replace(UNIT, baselines=True)],
+    "negatives": [replace(UNIT, negatives=True)],
+    "stranger": [
+        replace(UNIT, stranger=stranger)
+        for stranger in (FLIGHT, replace(FLIGHT, seed=4), replace(FLIGHT, scene=load_scene("flat")))
+    ],
 }
 
 
@@ -129,9 +134,11 @@ def test_units_that_share_their_maps_are_done_together() -> None:
 
 
 def test_what_is_done_for_the_first_setup_alone_is_done_for_the_right_one() -> None:
-    shown, plain = replace(UNIT, showcase=True, baselines=True), replace(UNIT, seed=3)
+    asked = {"showcase": True, "baselines": True, "negatives": True, "stranger": FLIGHT}
+    shown, plain = replace(UNIT, **asked), replace(UNIT, seed=3)  # type: ignore[arg-type]
     assert grouped([shown, plain]) == [[shown, plain]]
     assert grouped([plain, shown]) == [[plain], [shown]]
     task = task_of([shown, plain], renderers=2)
     assert (task.showcase, task.baselines, task.budget) == (True, True, False)
+    assert (task.negatives, task.stranger) == (True, FLIGHT)
     assert (task.setups, task.renderers) == ([shown.setup, plain.setup], 2)
