@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from airground.core.belief import Alignment, Belief
-from evaluation import calibration
 from evaluation.relation import PoseError
 from evaluation.results import Condition, Row
 
@@ -66,7 +65,7 @@ class RowWriter:
         for metric, value, unit in (
             ("error_m", error.horizontal_m, "m"),
             ("spread_m", belief.spread_m, "m"),
-            (calibration.METRIC, squared_mahalanobis, ""),
+            ("squared_mahalanobis", squared_mahalanobis, ""),
             ("converged", belief.converged, ""),
         ):
             note = belief.refusal if metric == "converged" else ""
