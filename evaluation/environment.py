@@ -67,7 +67,7 @@ def _keep_freed_memory() -> None:
     """Have the allocator keep what images and volumes leave for the next ones.
 
     By default glibc hands every array of more than some 100 kB back to the system, which has
-    to clear its pages again for the next one: a tenth of the time of a run. Other C
+    to clear its pages again for the next one: a fifth of the time of reading an image. Other C
     libraries have no such setting and are left alone.
     """
     try:

@@ -39,7 +39,7 @@ from evaluation.tracking_quality import Tracked, add_tracking
 from sim.truth import Truth
 
 FRAMES_AHEAD = 60
-"""Tracked frames that may wait for mapping: as many as come while a surface is fused."""
+"""Tracked frames that may wait for mapping: those of a second, of two robots at 30 Hz."""
 
 
 @dataclass(frozen=True)

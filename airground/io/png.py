@@ -1,6 +1,6 @@
-"""Decoding the PNG images that recordings hold, more than twice as fast as libpng does.
+"""Decoding the PNG images that recordings hold, about twice as fast as libpng does.
 
-Half of what libpng takes for a camera's image goes into inflating it, which Intel's ISA-L
+Most of what libpng takes for a camera's image goes into inflating it, which Intel's ISA-L
 does faster; what remains is to undo the filters of the rows. Only the kinds of PNG that a
 recording uses are decoded here: grey of 8 or 16 bits and RGB of 8, not interlaced.
 """
