@@ -9,7 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -69,6 +69,7 @@ def test_every_kind_and_filter_is_decoded_as_opencv_does(kind: str, filters: int
 
 
 @pytest.mark.kernel
+@settings(deadline=None)  # the first example compiles
 @given(st.integers(0, 2**32 - 1), st.integers(1, 3))
 def test_filters_are_undone_as_the_specification_says(seed: int, pixel_bytes: int) -> None:
     rng = np.random.default_rng(seed)
@@ -107,6 +108,12 @@ def test_a_flipped_bit_is_noticed(at: float) -> None:
     packed[int(at * len(packed))] ^= 4
     with pytest.raises(ValueError, match="damaged"):
         decode_png(bytes(packed))
+
+
+def test_data_without_their_end_are_noticed() -> None:
+    """All rows are there, but not the checksum."""
+    with pytest.raises(ValueError, match="wrong place"):
+        decode_png(by_hand(4, 2, zlib.compress(bytes(10))[:-4]))
 
 
 def test_an_unknown_filter_is_noticed() -> None:
