@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airground.io.read_ahead import AHEAD, read_ahead, run_ahead
@@ -41,6 +41,7 @@ def test_what_cannot_be_read_is_told_when_its_turn_comes() -> None:
             next(items)
 
 
+@settings(deadline=None)  # threads wait for a busy machine
 @given(count=st.integers(0, 20), ahead=st.integers(1, 5))
 def test_running_ahead_changes_nothing(count: int, ahead: int) -> None:
     assert list(run_ahead(iter(range(count)), ahead)) == list(range(count))
