@@ -12,7 +12,7 @@ from airground.localization.cost_map import compute_cost_map, overlay_at, reach_
 from airground.localization.height_map import aerial_height_map, ground_height_map
 from airground.localization.particle_filter import motion_at
 from evaluation.baselines.seam import Answer, Given
-from evaluation.setups import with_localization
+from evaluation.protocol.setups import with_localization
 
 MIN_OVERLAP = 0.5
 """Of the aerial map's area, as the paper asks (Sec. VI-A)."""

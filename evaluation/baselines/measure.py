@@ -15,10 +15,10 @@ from airground.pipeline import Sighting
 from evaluation.baselines.seam import Answer, Baseline, Given
 from evaluation.baselines.table import BASELINES
 from evaluation.baselines.views import GroundViews, aerial_view
-from evaluation.mapping_pass import Maps
-from evaluation.relation import pose_error, true_T_ground_mav
-from evaluation.row_writer import RowWriter
-from evaluation.trials import noisy_start, spread_evenly, trial_sightings
+from evaluation.protocol.mapping_pass import Maps
+from evaluation.protocol.trials import noisy_start, spread_evenly, trial_sightings
+from evaluation.results.row_writer import RowWriter
+from evaluation.truth.relation import pose_error, true_T_ground_mav
 from sim.truth import Truth
 
 STAGE = "baseline"

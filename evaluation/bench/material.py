@@ -34,8 +34,8 @@ from airground.io.recording import Recording
 from airground.pipeline import Pipeline, Sighting, sight
 from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
 from airground.tracking import FrontEnds, Trackers
-from evaluation.run import FRAMES_AHEAD
-from evaluation.watched_front_end import WatchedFrontEnd
+from evaluation.runs.recording import FRAMES_AHEAD
+from evaluation.runs.watched_front_end import WatchedFrontEnd
 
 ALIGNED_SURFACES = 3
 """The surface that is kept is this one of those that were aligned: by then there is a map."""

@@ -34,8 +34,8 @@ class Accept(Verb):
 
         from evaluation.regression.accepted import Accepted
         from evaluation.regression.measured import Measured
-        from evaluation.results_folder import SUMMARY, read_table
-        from evaluation.summary import Summary
+        from evaluation.results.folder import SUMMARY, read_table
+        from evaluation.results.summary import Summary
 
         before = Accepted.read(self.to) if self.to.exists() else None
         measured = Measured.of(read_table(self.results))

@@ -53,8 +53,8 @@ class AloneWords:
         from airground.io.open_robot import open_robot
         from airground.slam import front_ends
         from evaluation.output import fresh_folder
-        from evaluation.run_alone import print_alone, run_alone, write_alone
-        from evaluation.true_camera import true_camera
+        from evaluation.runs.alone import print_alone, run_alone, write_alone
+        from evaluation.truth.camera import true_camera
 
         robot = Source.MAV if self.only == "mav" else Source.GROUND
         with fresh_folder(out) as folder:

@@ -39,7 +39,7 @@ class Check(Verb):
         from evaluation.regression.junit import junit
         from evaluation.regression.measured import Measured
         from evaluation.regression.verdict import Verdict, compare
-        from evaluation.results_folder import read_table
+        from evaluation.results.folder import read_table
 
         before = self._reference()
         after = Measured.of(read_table(self.results), before.condition)
@@ -54,7 +54,7 @@ class Check(Verb):
     def _reference(self) -> Measured:
         from evaluation.regression.accepted import Accepted
         from evaluation.regression.measured import Measured
-        from evaluation.results_folder import read_table
+        from evaluation.results.folder import read_table
 
         if self.against.is_dir():
             return Measured.of(read_table(self.against))

@@ -24,8 +24,8 @@ class Evaluate(Verb, OutWord):
 
     def main(self) -> None:
         from evaluation.output import fresh_folder
-        from evaluation.results_folder import merged, read_results
-        from evaluation.screen import print_summary
+        from evaluation.results.folder import merged, read_results
+        from evaluation.runs.screen import print_summary
 
         if not self.runs:
             raise InputError("no RUN given: name at least one folder of run or reproduce")

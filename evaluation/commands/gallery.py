@@ -25,8 +25,8 @@ class Gallery(Verb, OutWord):
     def main(self) -> None:
         from evaluation.figures.style import save_picture
         from evaluation.output import fresh_folder
-        from evaluation.report_figures import report_figures
-        from evaluation.results_folder import read_results
+        from evaluation.report.figures import report_figures
+        from evaluation.results.folder import read_results
 
         results = read_results(self.run)
         if results.showcase is None:

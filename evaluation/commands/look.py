@@ -12,7 +12,7 @@ from airground.errors import InputError
 
 if TYPE_CHECKING:
     from airground.io.recording import Recording
-    from evaluation.onlooker import Onlooker
+    from evaluation.runs.onlooker import Onlooker
     from sim.truth import Truth
 
 

@@ -11,8 +11,8 @@ from tyro.conf import arg
 from airground.errors import InputError
 
 if TYPE_CHECKING:
-    from evaluation.given import Given
-    from evaluation.setups import Setup
+    from evaluation.protocol.setups import Setup
+    from evaluation.runs.given import Given
 
 _OPTIONAL = "(optional)"
 
@@ -76,7 +76,7 @@ class OwnWords:
         from airground.io.open_robot import open_robot
         from airground.io.pair import Pair
         from evaluation.output import fresh_folder
-        from evaluation.run_pair import print_pair, run_pair, write_pair
+        from evaluation.runs.pair import print_pair, run_pair, write_pair
         from evaluation.settings import write_config
 
         assert self.mav is not None
@@ -104,7 +104,7 @@ class OwnWords:
 
     def _given(self) -> Given:
         from airground.io.tum import read_tum
-        from evaluation.given import Given, read_map
+        from evaluation.runs.given import Given, read_map
 
         return Given(
             mav=read_tum(self.mav_trajectory) if self.mav_trajectory else None,

@@ -20,8 +20,8 @@ from evaluation.commands.words import (
 )
 
 if TYPE_CHECKING:
+    from evaluation.protocol.reproduce import Plan
     from evaluation.regression.suite import SuitePlan
-    from evaluation.reproduce import Plan
 
 SCENES = ("indoor_a", "indoor_b", "indoor_c", "flat")
 FLIGHTS, SEQUENCES, TRIALS, BASELINES = 2, 7, 12, 12
@@ -86,8 +86,8 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, Cluste
     The results are the same, but for times, which then include waiting for images."""
 
     def main(self) -> None:
-        from evaluation.results_folder import Results
-        from evaluation.screen import print_summary
+        from evaluation.results.folder import Results
+        from evaluation.runs.screen import print_summary
         from evaluation.units.crew import Crew
         from evaluation.units.out_folder import resumable_folder
 
@@ -117,9 +117,9 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, Cluste
 
     def plan(self) -> Plan:
         """What the words ask for, checked."""
-        from evaluation.reproduce import Plan
-        from evaluation.setups import with_companions
-        from evaluation.trials import Protocol
+        from evaluation.protocol.reproduce import Plan
+        from evaluation.protocol.setups import with_companions
+        from evaluation.protocol.trials import Protocol
         from sim.presets import sensor_preset
         from sim.scene import load_scene
 

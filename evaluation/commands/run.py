@@ -18,10 +18,10 @@ from evaluation.commands.words import OutWord, SeedWord, SetupWords, Verb
 
 if TYPE_CHECKING:
     from airground.io.recording import Recording
-    from evaluation.onlooker import Onlooker
+    from evaluation.protocol.setups import Setup
     from evaluation.realtime.drops import DropList
-    from evaluation.run import RunResult
-    from evaluation.setups import Setup
+    from evaluation.runs.onlooker import Onlooker
+    from evaluation.runs.recording import RunResult
     from sim.truth import Truth
 
 DROPPED = "dropped.json"
@@ -60,11 +60,11 @@ class Run(Verb, OwnWords, AloneWords, RealtimeWords, LookWords, SetupWords, Seed
     def _run_both(self, path: Path) -> None:
         from airground.io.layout import HEADER
         from airground.io.recording import Recording
-        from evaluation.close_up import CloseUp
         from evaluation.output import fresh_folder
-        from evaluation.results_folder import Results
-        from evaluation.run import write_run
-        from evaluation.screen import print_summary
+        from evaluation.results.folder import Results
+        from evaluation.runs.recording import write_run
+        from evaluation.runs.screen import print_summary
+        from evaluation.showcase.close_up import CloseUp
         from sim.truth import Truth
 
         if path.is_dir() and not (path / HEADER).exists():
@@ -99,7 +99,7 @@ class Run(Verb, OwnWords, AloneWords, RealtimeWords, LookWords, SetupWords, Seed
         """What the run leaves, and which frames it did without."""
         from evaluation.realtime.drops import DropList, nothing_dropped
         from evaluation.realtime.live_run import run_live
-        from evaluation.run import run_recording
+        from evaluation.runs.recording import run_recording
 
         if self.realtime:
             return run_live(recording, truth, setup, seed, self.playback())

@@ -64,9 +64,9 @@ class Sweep(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, ClusterWor
 
     def plan(self) -> SweepPlan:
         """What the words ask for, checked as far as can be without flying."""
+        from evaluation.protocol.trials import Protocol
         from evaluation.sweep.plan import SweepPlan
         from evaluation.sweep.vary import parse_vary
-        from evaluation.trials import Protocol
         from sim.presets import sensor_preset
         from sim.scene import load_scene
 

@@ -15,8 +15,8 @@ from evaluation.environment import usable_cores
 
 if TYPE_CHECKING:
     from airground.config import Config
-    from evaluation.oracle import PoseNoise
-    from evaluation.setups import Setup
+    from evaluation.protocol.setups import Setup
+    from evaluation.truth.oracle import PoseNoise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,7 +126,7 @@ class PoseWords:
         Raises:
             InputError: A number is out of range, or there is no oracle to add it to.
         """
-        from evaluation.oracle import EXACT, PoseNoise
+        from evaluation.truth.oracle import EXACT, PoseNoise
 
         noise = PoseNoise(
             drift_mav_m=in_range("--drift-mav-cm", self.drift_mav_cm, high=100) / 100,
@@ -144,7 +144,7 @@ class SetupWords(PipelineWords, PoseWords):
     """All that makes a setup: the pipeline's parameters and the poses."""
 
     def setup(self) -> Setup:
-        from evaluation.setups import Setup
+        from evaluation.protocol.setups import Setup
 
         return Setup(self.resolved_config(), self.poses, self.pose_noise())
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from evaluation.figures.boxes import draw_box, log_axis, positions
 from evaluation.figures.style import PAPER, SERIES, styled
-from evaluation.statistics import quantile, with_failures
+from evaluation.statistics.intervals import quantile, with_failures
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike, NDArray
 
-from evaluation.statistics import quantile, with_failures
+from evaluation.statistics.intervals import quantile, with_failures
 
 
 def draw_box(axes: Axes, x: float, values: ArrayLike, width: float, colour: str) -> None:

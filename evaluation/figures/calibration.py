@@ -6,8 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from evaluation.calibration import ELLIPSES, Localizations
 from evaluation.figures.style import FAINT, INK, SERIES, styled
+from evaluation.trust.calibration import ELLIPSES, Localizations
 
 NOMINAL = np.linspace(0.01, 0.99, 99)
 

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from evaluation.figures.style import SERIES, styled
-from evaluation.statistics import quantile
+from evaluation.statistics.intervals import quantile
 
 
 @styled

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from evaluation.baselines.matched_images import MatchedImages
 from evaluation.figures.style import SERIES, picture_axes, styled
-from evaluation.trials import spread_evenly
+from evaluation.protocol.trials import spread_evenly
 
 GAP_PX = 16
 DRAWN = 120

@@ -8,7 +8,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from evaluation.figures.style import picture_axes, styled
-from evaluation.scene_pictures import GROUND_COLOUR, GROUND_PATH, MAV_COLOUR, MAV_PATH
+from evaluation.showcase.scene_pictures import GROUND_COLOUR, GROUND_PATH, MAV_COLOUR, MAV_PATH
 
 
 @styled

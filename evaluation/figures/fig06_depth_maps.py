@@ -16,7 +16,7 @@ from evaluation.figures.style import (
     picture_axes,
     styled,
 )
-from evaluation.showcase import Showcase
+from evaluation.showcase.showcase import Showcase
 
 SHOWN = 3
 """Single depth maps shown beside the fused one."""

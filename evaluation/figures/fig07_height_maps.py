@@ -10,7 +10,7 @@ from scipy.ndimage import binary_closing, binary_fill_holes
 
 from evaluation.figures.maps import draw_costs, draw_grid, mark_truth
 from evaluation.figures.style import HEIGHT_COLOURS, PAPER, styled
-from evaluation.showcase import Showcase
+from evaluation.showcase.showcase import Showcase
 
 
 @styled

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from evaluation.figures.maps import draw_costs, mark_truth
 from evaluation.figures.style import styled
-from evaluation.showcase import LocalizationStep
+from evaluation.showcase.showcase import LocalizationStep
 
 PARTICLES = "#35C46A"
 ZOOM_BELOW_M = 0.25

@@ -9,10 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from evaluation import published
 from evaluation.figures.boxes import draw_box, iteration_axis, log_axis, positions
 from evaluation.figures.style import PAPER, SERIES, styled
-from evaluation.statistics import rate_within
+from evaluation.report import published
+from evaluation.statistics.intervals import rate_within
 
 
 @styled

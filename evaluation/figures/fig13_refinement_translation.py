@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from evaluation import published
 from evaluation.figures.before_after import BeforeAfter, before_after_figure
 from evaluation.figures.style import SERIES
+from evaluation.report import published
 
 
 def refinement_translation_figure(

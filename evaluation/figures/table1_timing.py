@@ -8,7 +8,7 @@ from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
 from evaluation.figures.style import FAINT, PAPER, SERIES, styled
-from evaluation.published import TABLE_I
+from evaluation.report.published import TABLE_I
 
 
 @styled

@@ -17,7 +17,7 @@ from airground.io.robot_recording import RobotRecording
 from evaluation.inspection.findings import Finding, Verdict
 from evaluation.inspection.rhythm import look_at_stamps
 from evaluation.inspection.truth_against_images import hold_truth_against_images, look_at_truth
-from evaluation.true_camera import true_camera
+from evaluation.truth.camera import true_camera
 
 FIELD_OF_VIEW_DEG = (20.0, 150.0)
 MIN_DEPTH = 0.05

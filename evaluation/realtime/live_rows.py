@@ -8,7 +8,7 @@ from airground.io.recording import Recording
 from evaluation.realtime.live_summary import STAGE
 from evaluation.realtime.lived import Lived, Playback
 from evaluation.realtime.tracker_process import TrackerReport
-from evaluation.row_writer import RowWriter
+from evaluation.results.row_writer import RowWriter
 
 
 def add_live_rows(out: RowWriter, recording: Recording, lived: Lived, playback: Playback) -> None:

@@ -15,7 +15,8 @@ from airground.io.recording import Recording
 from airground.link.channel import Receiver
 from airground.tracking import TrackedFrame
 from airground.warm_up import warm_up_mapping
-from evaluation.experiment import peak_memory_mib
+from evaluation.protocol.experiment import peak_memory_mib
+from evaluation.protocol.setups import Setup
 from evaluation.realtime.arrivals import in_order
 from evaluation.realtime.clock import PlaybackClock
 from evaluation.realtime.drops import DropList
@@ -23,11 +24,10 @@ from evaluation.realtime.live_rows import add_live_rows
 from evaluation.realtime.lived import Lived, Playback
 from evaluation.realtime.robot_process import RobotProcess
 from evaluation.realtime.tracker_process import TrackerTask
-from evaluation.run import Measure, RunResult
-from evaluation.setups import Setup
-from evaluation.timing import timed
-from evaluation.tracking_quality import Tracked
-from evaluation.watched_front_end import FrontEndLog
+from evaluation.runs.recording import Measure, RunResult
+from evaluation.runs.timing import timed
+from evaluation.runs.watched_front_end import FrontEndLog
+from evaluation.truth.tracking_quality import Tracked
 from sim.truth import Truth
 
 START_NS = 300_000_000

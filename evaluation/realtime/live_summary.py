@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from evaluation.results import ResultTable
-from evaluation.statistics import quantile
-from evaluation.summary_parts import Count, Number, Part, number
+from evaluation.results.summary_parts import Count, Number, Part, number
+from evaluation.results.table import ResultTable
+from evaluation.statistics.intervals import quantile
 
 STAGE = "realtime"
 """Of all rows that tell how a live run went."""

@@ -19,15 +19,15 @@ from airground.link.channel import Sender
 from airground.slam.warm_up import warm_up_slam
 from airground.tracking import RobotTracker
 from evaluation.environment import prepare
-from evaluation.experiment import peak_memory_mib
-from evaluation.front_ends import front_ends_for
+from evaluation.protocol.experiment import peak_memory_mib
+from evaluation.protocol.setups import Setup
 from evaluation.realtime.clock import PlaybackClock
 from evaluation.realtime.player import Played, play
 from evaluation.realtime.radio import Radio, RadioLimits
 from evaluation.realtime.uplink import Uplink
-from evaluation.run import front_end_rng
-from evaluation.setups import Setup
-from evaluation.watched_front_end import FrontEndLog
+from evaluation.runs.front_ends import front_ends_for
+from evaluation.runs.recording import front_end_rng
+from evaluation.runs.watched_front_end import FrontEndLog
 from sim.truth import Truth
 
 

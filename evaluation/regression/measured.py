@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from airground.errors import InputError
-from evaluation.comparison import median
 from evaluation.regression.metrics import WATCHED, Metric
 from evaluation.regression.samples import Flight, Samples, flights
-from evaluation.results import Condition, ResultTable
+from evaluation.results.table import Condition, ResultTable
+from evaluation.statistics.comparison import median
 
 
 @dataclass(frozen=True)

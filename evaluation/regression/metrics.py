@@ -12,7 +12,7 @@ from typing import Literal
 
 from evaluation.regression import samples
 from evaluation.regression.samples import Samples, Take
-from evaluation.results import ResultTable
+from evaluation.results.table import ResultTable
 
 UnitOfObservation = Literal["recording", "surface", "sequence", "aerial map", "trial"]
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from evaluation.results import SEQUENCE_KEYS, TRIAL_KEYS, ResultTable
+from evaluation.results.table import SEQUENCE_KEYS, TRIAL_KEYS, ResultTable
 
 LOCATED_M = 0.25
 """Beyond this a claimed position is wrong."""

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from evaluation.reproduce import Findings
-from evaluation.setups import Setup
-from evaluation.trials import Protocol
+from evaluation.protocol.reproduce import Findings
+from evaluation.protocol.setups import Setup
+from evaluation.protocol.trials import Protocol
 from evaluation.units.crew import Crew
 from evaluation.units.measure import measure
 from evaluation.units.recordings import recorded

@@ -17,7 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.errors import InputError
-from evaluation.comparison import (
+from evaluation.regression.measured import Measured, figure, flight_value
+from evaluation.regression.metrics import WATCHED, Metric
+from evaluation.regression.samples import Samples
+from evaluation.results.table import Condition
+from evaluation.statistics.comparison import (
     Effect,
     adjusted,
     least_paired_p,
@@ -27,10 +31,6 @@ from evaluation.comparison import (
     subtract,
     two_sample_effect,
 )
-from evaluation.regression.measured import Measured, figure, flight_value
-from evaluation.regression.metrics import WATCHED, Metric
-from evaluation.regression.samples import Samples
-from evaluation.results import Condition
 
 ALPHA = 0.05
 """How often a check of an unchanged program may call any metric better or worse."""

@@ -11,13 +11,13 @@ from airground.core.cloud import Source
 from airground.core.events import Aligned, BeliefUpdated, GroundTracked, MavTracked
 from airground.core.se3 import SE3
 from evaluation.figures.style import SERIES
-from evaluation.onlooker import Seen
-from evaluation.relation import BothPoses, pose_error
 from evaluation.rerun_view.colour_pictures import rgb
 from evaluation.rerun_view.level import Level, Pace
 from evaluation.rerun_view.names import ROBOT, TRUTH
 from evaluation.rerun_view.sensor_stream import SensorStream
-from evaluation.timing import STAGE_OF
+from evaluation.runs.onlooker import Seen
+from evaluation.runs.timing import STAGE_OF
+from evaluation.truth.relation import BothPoses, pose_error
 from sim.truth import Truth
 
 ROOM = "curves"

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from airground.core.events import DepthMapMade
 from evaluation.figures.style import ERROR_COLOURS
-from evaluation.onlooker import Seen
 from evaluation.rerun_view.colour_pictures import coloured
 from evaluation.rerun_view.level import Level, Pace
 from evaluation.rerun_view.names import TRUTH
 from evaluation.rerun_view.sensor_stream import SensorStream
-from evaluation.surface_error import depth_error
+from evaluation.runs.onlooker import Seen
+from evaluation.truth.surface_error import depth_error
 from sim.truth import Truth
 
 STEP_M = 1e-3

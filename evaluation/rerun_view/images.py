@@ -12,11 +12,11 @@ from airground.core.cloud import Source
 from airground.core.events import GroundTracked, Initializing, MavTracked, TrackingLost
 from airground.core.messages import GroundImage, MavImage, RobotCalibration
 from airground.slam.front_end import TrackedCorners
-from evaluation.onlooker import Seen
 from evaluation.rerun_view.level import Level, Pace
 from evaluation.rerun_view.names import ROBOT, camera_frame, image_frame
 from evaluation.rerun_view.robots import PATH_COLOUR
 from evaluation.rerun_view.sensor_stream import SensorStream
+from evaluation.runs.onlooker import Seen
 
 FRUSTUM_M = 0.35
 MAPPED, UNMAPPED = (90, 220, 120), (250, 190, 60)

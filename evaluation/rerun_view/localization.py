@@ -10,11 +10,11 @@ from airground.core.belief import Belief, CostMap, HeightMap
 from airground.core.events import BeliefUpdated, CostMapComputed, HeightMapsMade
 from evaluation.figures.fig08_particles import PARTICLES
 from evaluation.figures.style import COST_COLOURS, HEIGHT_COLOURS
-from evaluation.onlooker import Seen
-from evaluation.relation import true_T_ground_mav
 from evaluation.rerun_view.colour_pictures import cell_pixels, coloured, rgb, upright
 from evaluation.rerun_view.names import COSTS, TRUTH
 from evaluation.rerun_view.sensor_stream import SensorStream
+from evaluation.runs.onlooker import Seen
+from evaluation.truth.relation import true_T_ground_mav
 from sim.truth import Truth
 
 ROOM = "localization"

@@ -16,11 +16,11 @@ from airground.core.events import (
 from airground.core.messages import GroundImage
 from airground.core.se3 import SE3, interpolate
 from airground.core.voxel_map import VoxelMap
-from evaluation.onlooker import Seen
 from evaluation.rerun_view.level import Level, Pace
 from evaluation.rerun_view.names import GROUND, MAV, SURFACE
 from evaluation.rerun_view.sensor_stream import SensorStream, transform
-from evaluation.scene_pictures import GROUND_COLOUR, tinted
+from evaluation.runs.onlooker import Seen
+from evaluation.showcase.scene_pictures import GROUND_COLOUR, tinted
 
 SURFACE_COLOUR = (255, 150, 40)
 GLIDE_NS, GLIDE_STEPS = 400_000_000, 8

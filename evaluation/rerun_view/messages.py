@@ -16,8 +16,8 @@ from airground.core.events import (
     PosesCorrected,
     TrackingLost,
 )
-from evaluation.onlooker import Seen
 from evaluation.rerun_view.sensor_stream import SensorStream
+from evaluation.runs.onlooker import Seen
 
 ENTITY = "events"
 GOOD, NOTE, BAD = rr.TextLogLevel.INFO, rr.TextLogLevel.DEBUG, rr.TextLogLevel.WARN

@@ -11,11 +11,11 @@ from airground.core.events import GroundTracked, MavTracked
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.tracking import TrackedFrame
-from evaluation.onlooker import Seen
 from evaluation.rerun_view.level import Level, Pace
 from evaluation.rerun_view.names import ROBOT, camera_frame
 from evaluation.rerun_view.sensor_stream import SensorStream, transform
-from evaluation.scene_pictures import GROUND_PATH, MAV_PATH
+from evaluation.runs.onlooker import Seen
+from evaluation.showcase.scene_pictures import GROUND_PATH, MAV_PATH
 
 PATH_COLOUR = {Source.GROUND: GROUND_PATH, Source.MAV: MAV_PATH}
 PATH_RADIUS_M = 0.008

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from airground.core.cloud import Source
 from airground.io.recording import Recording
-from evaluation.onlooker import Onlooker, Seen
 from evaluation.rerun_view.curves import Curves
 from evaluation.rerun_view.depth_maps import DepthMaps
 from evaluation.rerun_view.images import Images
@@ -19,6 +18,7 @@ from evaluation.rerun_view.messages import Messages
 from evaluation.rerun_view.robots import Robots
 from evaluation.rerun_view.sensor_stream import SensorStream
 from evaluation.rerun_view.true_robots import TrueRobots
+from evaluation.runs.onlooker import Onlooker, Seen
 from sim.truth import Truth
 
 RUN_FILE = "run.rrd"

@@ -13,12 +13,12 @@ from airground.core.cloud import Source
 from airground.core.events import GroundTracked, MavTracked
 from airground.core.messages import RobotCalibration
 from airground.core.se3 import SE3
-from evaluation.onlooker import Seen
 from evaluation.rerun_view.images import pinhole
 from evaluation.rerun_view.level import Level, Pace
 from evaluation.rerun_view.names import GROUND, ROBOT, TRUTH, WORLD
 from evaluation.rerun_view.robots import REDRAWN_HZ, GrowingPath
 from evaluation.rerun_view.sensor_stream import SensorStream, transform
+from evaluation.runs.onlooker import Seen
 from sim.truth import Truth
 
 COLOUR = (255, 60, 200)

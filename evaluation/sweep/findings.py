@@ -13,8 +13,8 @@ import pandas as pd
 
 from evaluation.figures.style import save_figure
 from evaluation.figures.sweep_curves import sweep_figure
-from evaluation.results import CLOCK_STAGES, ResultTable
-from evaluation.run_info import RunInfo
+from evaluation.results.run_info import RunInfo
+from evaluation.results.table import CLOCK_STAGES, ResultTable
 from evaluation.settings import write_config
 from evaluation.sweep.dials import Point, Value, unit_of
 from evaluation.sweep.plan import SweepPlan

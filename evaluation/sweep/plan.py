@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from evaluation.setups import Setup
+from evaluation.protocol.setups import Setup
+from evaluation.protocol.trials import Protocol
 from evaluation.sweep.dials import Point, Subject, turned
 from evaluation.sweep.vary import Vary, points
-from evaluation.trials import Protocol
 from evaluation.units.unit import Unit, grouped
 from sim.presets import SensorPreset
 from sim.rendered import Flight

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evaluation.report_tables import success_at
-from evaluation.results import ResultTable
-from evaluation.statistics import Rate, median_interval, wilson
-from evaluation.summary import within_5cm_2deg
+from evaluation.report.tables import success_at
+from evaluation.results.summary import within_5cm_2deg
+from evaluation.results.table import ResultTable
+from evaluation.statistics.intervals import Rate, median_interval, wilson
 
 BOOTSTRAP_SEED = 0
 """The same table always gets the same intervals."""

@@ -3,8 +3,8 @@
 A result that is kept must never pass for one of other code. A revision of git would not do: it
 does not see what is not committed, and it changes with every sentence of the documentation. So
 this takes the sources themselves: all of `airground`, `sim` and `scenes`, and of `evaluation`
-only what `evaluation.experiment`, which makes every row, imports, whatever lies between. A change
-to a figure or to a report leaves the version as it is.
+only what `evaluation.protocol.experiment`, which makes every row, imports, whatever lies
+between. A change to a figure or to a report leaves the version as it is.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from airground.io.digests import bytes_digest, file_digest, folder_digest
 
 ROOT = Path(__file__).parents[2]
 WHOLE_ROOMS = ("airground", "sim", "scenes")
-MAKES_ROWS = "evaluation.experiment"
+MAKES_ROWS = "evaluation.protocol.experiment"
 LIBRARIES = (
     "kiss-matcher",
     "mujoco",

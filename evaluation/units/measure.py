@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from airground.errors import AirgroundError, InputError
-from evaluation.experiment import Outcome, Task, run_task
+from evaluation.protocol.experiment import Outcome, Task, run_task
 from evaluation.units.code_version import code_version
 from evaluation.units.crew import Crew
 from evaluation.units.progress import progress_bar

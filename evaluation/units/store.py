@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from evaluation.results import ResultTable, Row
-from evaluation.showcase import Showcase
+from evaluation.results.table import ResultTable, Row
+from evaluation.showcase.showcase import Showcase
 
 ROWS, MADE_FROM, SHOWCASE = "rows.parquet", "made_from.json", "showcase"
 _PARTIAL = ".partial-"

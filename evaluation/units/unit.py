@@ -11,9 +11,9 @@ from typing import Any
 from airground.errors import InputError
 from airground.io import layout
 from airground.io.digests import bytes_digest, file_digest
-from evaluation.experiment import Task
-from evaluation.setups import Setup
-from evaluation.trials import Protocol
+from evaluation.protocol.experiment import Task
+from evaluation.protocol.setups import Setup
+from evaluation.protocol.trials import Protocol
 from evaluation.units.code_version import code_version
 from sim.rendered import Flight
 

@@ -10,9 +10,9 @@ from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
 from airground.core.surface import AerialSurface, DepthMap
 from airground.core.trajectory import Trajectory
-from evaluation.published import TABLE_I
-from evaluation.results import Condition, ResultTable, Row
-from evaluation.showcase import LocalizationStep, Showcase
+from evaluation.report.published import TABLE_I
+from evaluation.results.table import Condition, ResultTable, Row
+from evaluation.showcase.showcase import LocalizationStep, Showcase
 
 BEST = Condition("best", "oracle exact", "nominal", "known")
 DRIFT = Condition("best", "oracle with drift", "nominal", "known")

@@ -17,7 +17,7 @@ from evaluation.figures.fig13_refinement_translation import refinement_translati
 from evaluation.figures.maps import draw_grid
 from evaluation.figures.style import save_figure
 from evaluation.figures.table1_timing import timing_figure
-from evaluation.showcase import Showcase
+from evaluation.showcase.showcase import Showcase
 from tests.evaluation.synthetic_results import make_showcase
 
 

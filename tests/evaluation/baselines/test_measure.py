@@ -15,10 +15,10 @@ from evaluation.baselines.seam import Answer, Baseline, Given
 from evaluation.baselines.table import BASELINES
 from evaluation.cli import parse
 from evaluation.commands.reproduce import Reproduce
-from evaluation.report_baselines import baseline_table, baseline_trials
-from evaluation.results import Condition, ResultTable
-from evaluation.row_writer import RowWriter
-from evaluation.trials import refine_sighting, spread_evenly, trial_sightings
+from evaluation.protocol.trials import refine_sighting, spread_evenly, trial_sightings
+from evaluation.report.baselines import baseline_table, baseline_trials
+from evaluation.results.row_writer import RowWriter
+from evaluation.results.table import Condition, ResultTable
 from tests.evaluation.baselines.closed_worlds import T_GROUND_MAV, boxes_on_floor, given_of
 
 CONDITION = Condition("best", "slam", "nominal", "known")

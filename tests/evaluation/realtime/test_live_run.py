@@ -20,13 +20,13 @@ from airground.config import Config, GroundMapping
 from airground.io.header import write_toml
 from airground.io.recording import Recording
 from evaluation import console
+from evaluation.protocol.setups import Setup
 from evaluation.realtime.drops import nothing_dropped
 from evaluation.realtime.live_run import run_live
 from evaluation.realtime.live_summary import LiveSummary, live_summary
 from evaluation.realtime.lived import Playback
 from evaluation.realtime.radio import RadioLimits
-from evaluation.run import RunResult, run_recording
-from evaluation.setups import Setup
+from evaluation.runs.recording import RunResult, run_recording
 from sim.truth import Truth
 from tests.io.recordings import HEIGHT, UNITS_PER_M, WIDTH, calibration, write_recording
 from tests.sim.flights import simulate, small_scene

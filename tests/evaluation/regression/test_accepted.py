@@ -12,7 +12,7 @@ import pytest
 from airground.errors import InputError
 from evaluation.regression.accepted import Accepted
 from evaluation.regression.measured import Measured
-from evaluation.results import ResultTable
+from evaluation.results.table import ResultTable
 from tests.evaluation.regression.flights import make_results
 
 DAY = date(2024, 5, 17)

@@ -13,9 +13,9 @@ from evaluation import cli, console
 from evaluation.regression.metrics import WATCHED
 from evaluation.regression.tables import HEADER, cells, markdown, print_comparison
 from evaluation.regression.verdict import compare
-from evaluation.results import ResultTable
-from evaluation.run_info import RunInfo
-from evaluation.summary import build_summary
+from evaluation.results.run_info import RunInfo
+from evaluation.results.summary import build_summary
+from evaluation.results.table import ResultTable
 from tests.evaluation.regression.flights import make_results, measured
 
 SEEDS = range(10)

@@ -20,11 +20,11 @@ from airground.core.surface import AerialSurface
 from airground.localization import cost_map, particle_filter
 from airground.localization.particle_filter import MonteCarloLocalizer
 from airground.pipeline import Sighting
+from evaluation.protocol.trials import localize_sequence
 from evaluation.regression.measured import Measured
 from evaluation.regression.verdict import Comparison, Verdict, compare
-from evaluation.results import Condition, ResultTable
-from evaluation.row_writer import RowWriter
-from evaluation.trials import localize_sequence
+from evaluation.results.row_writer import RowWriter
+from evaluation.results.table import Condition, ResultTable
 from tests.localization.synthetic import aerial_points, box_heap, ground_points
 
 pytestmark = pytest.mark.slow

@@ -10,7 +10,7 @@ import pytest
 from evaluation.regression.measured import figure
 from evaluation.regression.metrics import WATCHED
 from evaluation.regression.samples import Flight
-from evaluation.results import Condition, ResultTable, Row
+from evaluation.results.table import Condition, ResultTable, Row
 
 METRICS = {metric.name: metric for metric in WATCHED}
 CONDITION = Condition("best", "slam", "nominal", "known")

@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from airground.config import Config
-from evaluation.comparison import least_paired_p
+from evaluation.protocol.setups import Setup
+from evaluation.protocol.trials import Protocol
 from evaluation.regression import suite
 from evaluation.regression.metrics import WATCHED
 from evaluation.regression.suite import SUITES, Flights, Suite, SuitePlan
 from evaluation.regression.verdict import ALPHA
-from evaluation.results import CONTROL_SCENES, ResultTable, Row
-from evaluation.setups import Setup
-from evaluation.trials import Protocol
+from evaluation.results.table import CONTROL_SCENES, ResultTable, Row
+from evaluation.statistics.comparison import least_paired_p
 from evaluation.units.crew import Crew
 from evaluation.units.out_folder import resumable_folder
 from evaluation.units.recordings import recording_name

@@ -7,11 +7,11 @@ import pandas as pd
 import pytest
 
 from airground.errors import InputError
-from evaluation.comparison import least_paired_p
 from evaluation.regression.measured import Measured
 from evaluation.regression.metrics import WATCHED
 from evaluation.regression.verdict import ALPHA, Verdict, compare
-from evaluation.results import ResultTable
+from evaluation.results.table import ResultTable
+from evaluation.statistics.comparison import least_paired_p
 from tests.evaluation.regression.flights import make_results, measured
 
 SEEDS = range(10)

@@ -38,9 +38,9 @@ from airground.io.recording import Recording
 from airground.pipeline import Sighting
 from airground.slam.front_end import TrackedCorners, TrackedPose, Tracking
 from airground.tracking import TrackedFrame
-from evaluation.onlooker import Onlooker, Seen
 from evaluation.rerun_view.level import LevelName
 from evaluation.rerun_view.run_view import RunView
+from evaluation.runs.onlooker import Onlooker, Seen
 from sim.truth import Truth
 
 SECOND = 1_000_000_000

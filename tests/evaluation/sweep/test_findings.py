@@ -12,15 +12,15 @@ from rich.console import Console
 
 from airground.config import Config
 from evaluation.figures.sweep_curves import sweep_figure
-from evaluation.results import ResultTable, Row
-from evaluation.setups import Setup
-from evaluation.statistics import rate_within
+from evaluation.protocol.setups import Setup
+from evaluation.protocol.trials import Protocol
+from evaluation.results.table import ResultTable, Row
+from evaluation.statistics.intervals import rate_within
 from evaluation.sweep import findings as module
 from evaluation.sweep.findings import Measured, sweep, write_sweep
 from evaluation.sweep.plan import SweepPlan
 from evaluation.sweep.screen import print_sweep
 from evaluation.sweep.vary import parse_vary
-from evaluation.trials import Protocol
 from evaluation.units.crew import Crew
 from evaluation.units.store import Finished, UnitStore
 from evaluation.units.unit import Unit

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from airground.config import Config
 from airground.errors import InputError
-from evaluation.setups import Setup
+from evaluation.protocol.setups import Setup
+from evaluation.protocol.trials import Protocol
 from evaluation.sweep.dials import DIALS, Subject, turned
 from evaluation.sweep.plan import SweepPlan
 from evaluation.sweep.vary import Vary, parse_vary, points
-from evaluation.trials import Protocol
 from sim.presets import NOMINAL, NONE
 from sim.scene import load_scene
 

@@ -8,10 +8,10 @@ import time
 from pathlib import Path
 
 from airground.config import Config
-from evaluation.experiment import Outcome
-from evaluation.results import Row
-from evaluation.setups import Setup, with_localization
-from evaluation.trials import Protocol
+from evaluation.protocol.experiment import Outcome
+from evaluation.protocol.setups import Setup, with_localization
+from evaluation.protocol.trials import Protocol
+from evaluation.results.table import Row
 from evaluation.units.measure import Refused, Sent
 from evaluation.units.unit import Unit
 

@@ -23,10 +23,10 @@ def test_sources_are_followed_through_imports(tmp_path: Path) -> None:
         tmp_path,
         airground__core__a="",
         sim__b="",
-        evaluation__experiment="from evaluation.metrics import x\nimport numpy",
+        evaluation__protocol__experiment="from evaluation.metrics import x\nimport numpy",
         evaluation__metrics="def f():\n    import evaluation.deep.deeper",
-        evaluation__deep__deeper="from evaluation.experiment import y",
-        evaluation__report="",
+        evaluation__deep__deeper="from evaluation.protocol.experiment import y",
+        evaluation__report__page="",
     )
     (tmp_path / "evaluation/deep/__init__.py").write_text("from evaluation import beside")
     (tmp_path / "evaluation/beside.py").write_text("")
@@ -36,7 +36,7 @@ def test_sources_are_followed_through_imports(tmp_path: Path) -> None:
         "airground/core/a.py",
         "sim/b.py",
         "scenes/c.toml",
-        "evaluation/experiment.py",
+        "evaluation/protocol/experiment.py",
         "evaluation/metrics.py",
         "evaluation/deep/__init__.py",
         "evaluation/deep/deeper.py",
@@ -46,10 +46,24 @@ def test_sources_are_followed_through_imports(tmp_path: Path) -> None:
 
 def test_what_makes_our_rows_is_in_it_and_what_shows_them_is_not() -> None:
     found = names(ROOT)
-    for made in ("trials", "mapping_pass", "oracle", "baselines/asift", "error_budget"):
+    for made in (
+        "protocol/trials",
+        "protocol/mapping_pass",
+        "truth/oracle",
+        "baselines/asift",
+        "protocol/error_budget",
+    ):
         assert f"evaluation/{made}.py" in found
     assert "scenes/tiny.toml" in found
     assert "airground/localization/particle_filter.py" in found
-    for shown in ("figures/style", "report", "cli", "units/store", "sweep/dials", "statistics"):
+    for shown in (
+        "figures/style",
+        "report/page",
+        "cli",
+        "units/store",
+        "sweep/dials",
+        "statistics/intervals",
+    ):
+        assert (ROOT / f"evaluation/{shown}.py").exists()
         assert f"evaluation/{shown}.py" not in found
     assert len(code_version()) == 64

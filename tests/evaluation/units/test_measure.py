@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from airground.errors import AirgroundError, InputError
-from evaluation.results import ResultTable
+from evaluation.results.table import ResultTable
 from evaluation.units import measure as module
 from evaluation.units.crew import Crew
 from evaluation.units.measure import measure

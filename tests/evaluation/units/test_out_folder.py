@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from airground.errors import InputError
-from evaluation.experiment import Outcome
-from evaluation.results import Condition, Row
+from evaluation.protocol.experiment import Outcome
+from evaluation.results.table import Condition, Row
 from evaluation.units.out_folder import LOCK, resumable_folder
 from evaluation.units.store import UnitStore
 

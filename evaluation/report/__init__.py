@@ -1,0 +1,1 @@
+"""`report.html`: tables, figures with captions, and what they say."""

@@ -1,0 +1,1 @@
+"""What experiments leave: rows, the folder they lie in, and the summary."""

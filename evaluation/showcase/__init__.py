@@ -1,0 +1,1 @@
+"""One flight looked at closely, and the pictures drawn from it."""

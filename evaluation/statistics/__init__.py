@@ -1,0 +1,1 @@
+"""Intervals that keep failures, and comparisons of two sets of results."""

@@ -1,0 +1,1 @@
+"""Who claims to know, who is wrong, and whether the spread says so."""

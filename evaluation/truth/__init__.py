@@ -1,0 +1,1 @@
+"""What is known to be true, and how far results lie from it."""
