@@ -31,7 +31,7 @@ check: $(READY)
 regression: OUT = results/regression
 regression: $(READY)
 	rm -rf $(OUT)
-	.venv/bin/airground reproduce --suite fast --out $(OUT)
+	.venv/bin/airground reproduce --suite fast --render --out $(OUT)
 	.venv/bin/airground check $(OUT)
 
 format: $(READY)

@@ -94,7 +94,7 @@ class ViewSelection(Section):
 class PlaneSweep(Section):
     """Depth maps from many close views (Sec. V)."""
 
-    hypotheses: Count = 128
+    hypotheses: Count = 100
     """Depth planes, evenly spaced in inverse depth."""
     window_px: Count = 3
     """Side of the window over which the photometric error is averaged [px, half resolution]."""

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 import open3d as o3d
+from numpy.typing import NDArray
 
 from airground.config import GroundMapping
 from airground.core.camera import PinholeCamera
@@ -24,6 +25,7 @@ from airground.ground_map.keyframe import GroundKeyframe
 
 _BLOCK = 8
 _FIRST_BLOCKS = 10_000
+_CUBE_M = 1e-4
 
 
 class GroundMap:
@@ -131,11 +133,27 @@ class GroundMap:
             return PointCloud.empty()
         points = extracted.point.positions.numpy()
         # Blocks come in the order of a parallel hash map, another each time.
-        order = np.lexsort(points.T)
+        order = lasting_order(points)
         colours = np.rint(extracted.point.colors.numpy()[order]).clip(0, 255)
         return PointCloud(
             points[order], colours.astype(np.uint8), extracted.point.normals.numpy()[order]
         )
+
+
+def lasting_order(points: NDArray[np.float32]) -> NDArray[np.int64]:
+    """(N,) an order of different points (N, 3) that is the same however they were shuffled.
+
+    By the small cube that each lies in, in one word, which sorts many times faster than three
+    coordinates; the few that share a word, by the coordinates.
+    """
+    x, y, z = np.floor(points.T.astype(np.float64) / _CUBE_M).astype(np.int64)
+    word = (z << 42) + (y << 21) + x
+    order = np.argsort(word)
+    same = np.diff(word[order]) == 0
+    shared = np.flatnonzero(np.append(same, False) | np.append(False, same))
+    rivals = order[shared]
+    order[shared] = rivals[np.lexsort((*points[rivals].T, word[rivals]))]
+    return order
 
 
 def _corrected(keyframe: GroundKeyframe, trajectory: Trajectory) -> GroundKeyframe:

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from evaluation.protocol.reproduce import Plan
     from evaluation.regression.suite import SuitePlan
 
-SCENES = ("indoor_a", "indoor_b", "indoor_c", "flat")
-FLIGHTS, SEQUENCES, TRIALS, BASELINES = 2, 7, 12, 12
-"""Over three scenes with structure: 42 sequences and 72 trials; the paper has 41 and 67."""
+SCENES = ("indoor_a", "indoor_b", "indoor_c", "outdoor", "flat")
+FLIGHTS, SEQUENCES, TRIALS, BASELINES = 2, 6, 9, 12
+"""Over four scenes with structure: 48 sequences and 72 trials; the paper has 41 and 67."""
 
 QUICK_SCENES = ("tiny",)
 QUICK_FLIGHTS, QUICK_SEQUENCES, QUICK_TRIALS, QUICK_BASELINES = 1, 4, 8, 0
@@ -91,6 +91,8 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, Cluste
         from evaluation.units.crew import Crew
         from evaluation.units.out_folder import resumable_folder
 
+        if self.render and self.recordings is not None:
+            raise InputError("--render keeps no recordings; leave out --recordings")
         plan = self.plan() if self.suite is None else self._suite(self.suite)
         setup, seed = self.setup(), self.checked_seed()
         with (
@@ -107,7 +109,7 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, Cluste
         from evaluation.regression.suite import SUITES, SuitePlan
         from sim.presets import sensor_preset
 
-        fixed = ("quick", "budget", "render", "scenes", "flights", "sequences_per_flight")
+        fixed = ("quick", "budget", "scenes", "flights", "sequences_per_flight")
         for field in (*fixed, "sequences", "trials", "baselines"):
             if getattr(self, field):
                 word = field.replace("_", "-")
@@ -126,8 +128,6 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, Cluste
         setup = self.setup()
         if self.budget and setup.poses != "slam":
             raise InputError("--budget asks what SLAM loses among others; give --poses slam")
-        if self.render and self.recordings is not None:
-            raise InputError("--render keeps no recordings; leave out --recordings")
         names = self.scenes or (QUICK_SCENES if self.quick else SCENES)
         return Plan(
             scenes=[load_scene(name) for name in names],
