@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from evaluation.bench.lane import Facts, Lane, Opened
     from evaluation.bench.row import Contender
     from evaluation.bench.sampler import Turn
+    from evaluation.realtime.live_summary import LiveSummary
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -50,6 +51,10 @@ class LaneProcess:
     def open(self, path: Path, whole: bool) -> Opened:
         """Probe the cores and play the recording."""
         return self._ask(_open, path, whole)
+
+    def live(self, path: Path) -> LiveSummary:
+        """Play the recording at its own rate through the pipeline."""
+        return self._ask(_live, path)
 
     def facts(self, row: str) -> Facts:
         return self._ask(_facts, row)
@@ -103,6 +108,12 @@ def _open(path: Path, whole: bool) -> Opened:
     lane, opened = open_lane(path, whole)
     _lanes[:] = [lane]
     return opened
+
+
+def _live(path: Path) -> LiveSummary:
+    from evaluation.bench.live import play_live
+
+    return play_live(path)
 
 
 def _facts(row: str) -> Facts:

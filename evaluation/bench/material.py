@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from airground.config import Config
 from airground.core.camera import PinholeCamera
-from airground.core.cloud import PointCloud
+from airground.core.cloud import PointCloud, Source
 from airground.core.events import (
     Aligned,
     DepthMapMade,
     Event,
     FieldAdded,
     FrameAdded,
+    GroundTracked,
     MavTracked,
     SurfaceCast,
 )
@@ -34,8 +35,12 @@ from airground.io.recording import Recording
 from airground.pipeline import Pipeline, Sighting, sight
 from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
 from airground.tracking import FrontEnds, Trackers
+from evaluation.bench.memory import resident_mib
 from evaluation.runs.recording import FRAMES_AHEAD
 from evaluation.runs.watched_front_end import WatchedFrontEnd
+
+PARTS = 10
+"""Memory is looked at so many times over a recording."""
 
 ALIGNED_SURFACES = 3
 """The surface that is kept is this one of those that were aligned: by then there is a map."""
@@ -101,12 +106,15 @@ class Played:
         recorded_s: How much was played.
         processing_s: By the clock, decoding included.
         cpu_s: Of the whole process.
+        resident_mib: What the process held after each of ten parts; fewer if it was cut short
+            or nobody counts it.
     """
 
     frame_ms: dict[str, list[float]]
     recorded_s: float
     processing_s: float
     cpu_s: float
+    resident_mib: list[float]
 
 
 def play(recording: Recording, config: Config, whole: bool) -> tuple[Material, Played]:
@@ -128,15 +136,37 @@ def play(recording: Recording, config: Config, whole: bool) -> tuple[Material, P
     trackers = Trackers(recording.mav, recording.ground, FrontEnds(mav, ground))
     pipeline = Pipeline(config, recording.mav, recording.ground, rng)
     gathering = _Gathering(recording, config, pipeline)
+    memory = MemoryLog(recording)
     started, cpu = time.perf_counter(), time.process_time()
     frames = trackers.frames(recording.messages())
     for event in pipeline.run(run_ahead(frames, FRAMES_AHEAD)):
         gathering.take(event)
+        memory.take(event)
         if gathering.complete and not whole:
             break
     processing_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu
     frame_ms = {"mav": mav.durations_ms, "ground": ground.durations_ms}
-    return gathering.material(), Played(frame_ms, recording.duration_s, processing_s, cpu_s)
+    return gathering.material(), Played(
+        frame_ms, recording.duration_s, processing_s, cpu_s, memory.resident_mib
+    )
+
+
+class MemoryLog:
+    """Listens to the pipeline, and looks at the memory after each part of the recording."""
+
+    def __init__(self, recording: Recording) -> None:
+        stamps_ns = recording.stamps_ns(Source.GROUND)
+        first_ns, last_ns = int(stamps_ns[0]), int(stamps_ns[-1])
+        ends_ns = np.linspace(first_ns, last_ns, PARTS + 1)[1:]
+        self._waiting_ns = [int(end_ns) for end_ns in ends_ns]
+        self.resident_mib: list[float] = []
+
+    def take(self, event: Event) -> None:
+        ground = isinstance(event, GroundTracked)
+        while ground and self._waiting_ns and event.stamp_ns >= self._waiting_ns[0]:
+            self._waiting_ns.pop(0)
+            now_mib = resident_mib()
+            self.resident_mib += [] if now_mib is None else [now_mib]
 
 
 @dataclass

@@ -31,6 +31,14 @@ def peak_memory_mib(call: Callable[[], object]) -> float | None:
         return None
 
 
+def resident_mib() -> float | None:
+    """What is resident now [MiB]; None where nobody counts it."""
+    try:
+        return _kib("VmRSS") / 1024
+    except OSError:
+        return None
+
+
 def _kib(key: str) -> int:
     for line in STATUS.read_text(encoding="ascii").splitlines():
         if line.startswith(f"{key}:"):

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from evaluation.bench.load import LoadAverage
 from evaluation.bench.sampler import Turn
 from evaluation.checked_json import read_checked
+from evaluation.realtime.live_summary import LiveSummary
 
 SCHEMA: Literal[1] = 1
 
@@ -113,7 +114,11 @@ class RowResult(Part):
 
 
 class RealTime(Part):
-    """The whole pipeline with SLAM over the recording, as fast as it goes."""
+    """The whole pipeline with SLAM over the recording, as fast as it goes.
+
+    `peak_memory_mib` is what this added to the process, `resident_mib` all that the process
+    held after each tenth of the recording.
+    """
 
     threads: Count
     recorded_s: Number
@@ -121,6 +126,7 @@ class RealTime(Part):
     cpu_s: Number
     real_time_factor: Number
     peak_memory_mib: Number | None
+    resident_mib: list[Number] = []
 
 
 class LaneSpeed(Part):
@@ -177,7 +183,7 @@ class CurveResult(Part):
 
 
 class BenchReport(Part):
-    """A whole benchmark."""
+    """A whole benchmark; `live` is null where the recording was not played at its own rate."""
 
     schema_: Literal[1] = Field(SCHEMA, alias="schema")
     version: str
@@ -188,6 +194,7 @@ class BenchReport(Part):
     recording: RecordingInfo
     rows: list[RowResult]
     pipeline: list[RealTime] = []
+    live: LiveSummary | None = None
     curves: list[CurveResult] = []
 
     model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)

@@ -124,7 +124,9 @@ PLAYED = {
 """Rows that are timed while the whole recording is played: stage, robot, target [ms]."""
 PIPELINE = "pipeline"
 """The row of the whole pipeline: its real-time factor."""
-NAMES = (*PLAYED, PIPELINE, *(row.name for row in ROWS))
+LIVE = "live"
+"""The row of a live run: images dropped, and how late poses come."""
+NAMES = (*PLAYED, PIPELINE, LIVE, *(row.name for row in ROWS))
 BY_NAME = {row.name: row for row in ROWS}
 
 

@@ -30,7 +30,7 @@ from evaluation.bench.report import (
     Timing,
 )
 from evaluation.bench.row import Contender, Row, Speed
-from evaluation.bench.rows import BY_NAME, PIPELINE, PLAYED
+from evaluation.bench.rows import BY_NAME, LIVE, PIPELINE, PLAYED
 from evaluation.bench.sampler import Turn, interleaved, wall_ratio
 from evaluation.results.run_info import RunInfo
 
@@ -70,6 +70,11 @@ def run_benchmark(
     counts = sorted({1, threads})
     whole = any(name in PLAYED or name == PIPELINE for name in names)
     load_before, meter = load_average(), LoadMeter()
+    live = None
+    if LIVE in names:
+        say(f"playing {recording.scene} at its own rate")
+        with lane_processes([threads]) as (process,):
+            live = process.live(path)
     with lane_processes(counts) as processes:
         opened: dict[int, Opened] = {}
         for process in processes:
@@ -102,6 +107,7 @@ def run_benchmark(
         ),
         rows=rows,
         pipeline=_real_time(opened) if PIPELINE in names else [],
+        live=live,
         curves=curves,
     )
 
@@ -202,6 +208,7 @@ def _real_time(opened: dict[int, Opened]) -> list[RealTime]:
             cpu_s=one.played.cpu_s,
             real_time_factor=one.played.recorded_s / one.played.processing_s,
             peak_memory_mib=one.peak_memory_mib,
+            resident_mib=one.played.resident_mib,
         )
         for count, one in sorted(opened.items())
     ]

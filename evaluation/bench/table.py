@@ -7,6 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from evaluation.bench.report import BenchReport, CurveResult, LaneTiming, RowResult
+from evaluation.report.live import live_rows
 
 ABSENT = "-"
 BUSY_CORES = 0.2
@@ -40,6 +41,14 @@ def footnotes(report: BenchReport) -> list[str]:
         for real in report.pipeline
     ]
     lines += [
+        f"{_cores(real.threads)}: {min(real.resident_mib):.0f} to {max(real.resident_mib):.0f} MiB "
+        f"held after the tenths of the recording, at the end {real.resident_mib[-1]:.0f}"
+        for real in report.pipeline
+        if real.resident_mib
+    ]
+    if report.live is not None:
+        lines += [f"live, {_of_robots(*row)}" for row in live_rows(report.live)]
+    lines += [
         f"{_cores(speed.threads)}: {speed.bandwidth_gb_s:.1f} GB/s, "
         f"{speed.arithmetic_gflop_s:.0f} Gflop/s as probed; floors come from these"
         for speed in machine.speeds
@@ -63,6 +72,12 @@ def footnotes(report: BenchReport) -> list[str]:
         if row.missing_peers
     ]
     return lines
+
+
+def _of_robots(title: str, mav: str, ground: str) -> str:
+    """A row of the table of live runs in one line."""
+    both = f"MAV {mav}, ground robot {ground}" if mav and ground else mav or ground
+    return f"{title}: {both}"
 
 
 def print_table(report: BenchReport, console: Console) -> None:

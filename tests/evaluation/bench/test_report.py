@@ -34,6 +34,8 @@ from evaluation.bench.report import (
 )
 from evaluation.bench.sampler import Sample
 from evaluation.bench.table import body, header, markdown, print_table
+from evaluation.realtime.live_summary import live_summary
+from tests.evaluation.synthetic_results import live_rows
 
 
 def timing(median_ms: float) -> Timing:
@@ -87,9 +89,10 @@ def report() -> BenchReport:
         pipeline=[
             RealTime(
                 threads=2, recorded_s=34, processing_s=17, cpu_s=30, real_time_factor=2,
-                peak_memory_mib=700,
+                peak_memory_mib=700, resident_mib=[800, 1000, 900],
             )
         ],
+        live=live_summary(live_rows(mav_dropped=3)),
         curves=[
             CurveResult(
                 name="voxels",
@@ -150,6 +153,9 @@ def test_what_is_printed_states_the_conditions(report: BenchReport) -> None:
     print_table(report, Console(file=out, width=200))
     said = out.getvalue()
     assert "real-time factor 2.00" in said
+    assert "2 cores: 800 to 1000 MiB held after the tenths of the recording, at the end 900" in said
+    assert "live, images dropped: MAV 3 of 7, ground robot 0 of 4" in said
+    assert "live, peak memory, all processes: 1100 MiB" in said
     assert "other programs: 0.25 cores busy" in said
     assert "measured under load" in said
     assert "scikit-image not installed" in said

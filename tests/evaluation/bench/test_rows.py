@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 from scipy.spatial import KDTree
 
+from airground.core.cloud import Source
+from airground.core.events import GroundTracked, MavTracked
+from airground.core.se3 import SE3
 from airground.errors import InputError
 from evaluation.bench import dense_rows, floors, localization_rows, map_rows, peers
 from evaluation.bench.curves import CURVES, exponent, tiled
 from evaluation.bench.lane import Lane
 from evaluation.bench.load import LoadMeter
-from evaluation.bench.material import Material
+from evaluation.bench.material import PARTS, Material, MemoryLog
 from evaluation.bench.memory import peak_memory_mib
 from evaluation.bench.row import Floor, Speed
 from evaluation.bench.rows import NAMES, ROWS, checked_names
@@ -179,6 +182,20 @@ def test_peak_memory_counts_touched_pages_only() -> None:
         pytest.skip("nobody counts memory here")
     assert touched == pytest.approx(61, abs=4)
     assert untouched < 4
+
+
+def test_memory_is_looked_at_after_each_tenth_of_the_recording(material: Material) -> None:
+    stamps_ns = material.recording.stamps_ns(Source.GROUND)
+    log = MemoryLog(material.recording)
+    for stamp_ns in stamps_ns:
+        log.take(MavTracked(int(stamp_ns), SE3.identity()))
+    assert log.resident_mib == []
+    for stamp_ns in stamps_ns[:-1]:
+        log.take(GroundTracked(int(stamp_ns), SE3.identity()))
+    assert len(log.resident_mib) < PARTS
+    log.take(GroundTracked(int(stamps_ns[-1]), SE3.identity()))
+    assert len(log.resident_mib) == PARTS
+    assert min(log.resident_mib) > 10
 
 
 def test_the_load_of_others_leaves_out_our_own() -> None:

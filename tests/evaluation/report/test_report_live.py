@@ -4,30 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from evaluation.realtime.live_summary import STAGE, live_summary
+from evaluation.realtime.live_summary import live_summary
 from evaluation.report.live import live_table
-from evaluation.results.row_writer import RowWriter
-from evaluation.results.table import ResultTable
-from tests.evaluation.synthetic_results import BEST, make_table
-
-
-def live_rows(mav_dropped: int = 0, survived: bool = True) -> ResultTable:
-    out = RowWriter("tiny", 0, 0, BEST)
-    for name, slow_ms in (("mav", 250.0), ("ground", 60.0)):
-        for posed_ms in (20.0, 20.0, 20.0, slow_ms):
-            out.add(STAGE, f"{name}_posed_ms", posed_ms, "ms")
-            out.add(STAGE, f"{name}_mapped_ms", posed_ms + 10, "ms")
-        dropped = mav_dropped if name == "mav" else 0
-        counts = {"images": 4 + dropped, "dropped": dropped, "lost": 2, "shed": 0, "late": 0}
-        for metric, value in counts.items():
-            out.add(STAGE, f"{name}_{metric}", value, "")
-        out.add(STAGE, f"{name}_survived", survived or name == "ground", "")
-        out.add(STAGE, f"{name}_sent_bytes", 2_500_000, "B")
-        out.add(STAGE, f"{name}_peak_memory_mib", 300, "MiB")
-    out.add(STAGE, "mapper_peak_memory_mib", 500, "MiB")
-    out.add(STAGE, "recorded_s", 10.0, "s")
-    out.add(STAGE, "rate", 1.0, "")
-    return ResultTable.from_rows(out.rows)
+from tests.evaluation.synthetic_results import live_rows, make_table
 
 
 def test_latencies_counts_and_rates_are_summed_up() -> None:
