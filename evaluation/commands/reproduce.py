@@ -67,7 +67,8 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, Cluste
         int | None, arg(metavar="N", help_behavior_hint="(default: what the flights give)")
     ] = None
     """At least so many in all: where the flights give fewer, the same scenes and flights follow
-    with the next seeds, `flat` apart."""
+    with the next seeds, `flat` apart; on these only the setup asked for, and what shares its
+    maps, as a searched heading does."""
     trials: Annotated[int | None, arg(metavar="N", help_behavior_hint=f"(default: {TRIALS})")] = (
         None
     )

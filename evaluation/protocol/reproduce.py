@@ -98,14 +98,14 @@ class Plan:
             crew: Does the work.
         """
         further = self.further_flights()
-        finished = self._flown(self.first_flights(), recordings, store, crew)
-        while (wanting := self.sequences - _sequences(finished[:: len(self.setups)])) > 0:
+        flown = self._flown(self.first_flights(), recordings, store, crew)
+        while (wanting := self.sequences - _sequences([units[0] for units in flown])) > 0:
             # No flight gives more sequences than this, so that none of them is one too many.
             flights = list(islice(further, -(-wanting // self.protocol.sequences)))
             if not flights:
                 break  # only control scenes
-            finished += self._flown(flights, recordings, store, crew)
-        return Findings.of(finished)
+            flown += self._flown(flights, recordings, store, crew)
+        return Findings.of([unit for units in flown for unit in units])
 
     def stranger(self, flight: Flight) -> Flight | None:
         """Whose ground map is the wrong one for a flight: the same flight over the next scene.
@@ -129,12 +129,15 @@ class Plan:
         def where(of: Flight) -> Path | Flight:
             return recordings.get(recording_name(of), of)
 
+        first_flights = self.first_flights()
+        # Flights that follow bring more sequences, of setups that need no maps of their own.
+        setups = self.setups
+        if flight not in first_flights:
+            setups = [setup for setup in setups if setup.maps_like(setups[0])]
         units = [
             Unit(where(flight), flight.seed, flight.flight, setup, self.protocol)
-            for setup in self.setups
+            for setup in setups
         ]
-        first_flights = self.first_flights()
-        # Flights that follow bring more sequences, and nothing else.
         negatives = flight in first_flights and flight.scene.name not in CONTROL_SCENES
         stranger = self.stranger(flight) if negatives else None
         units[0] = replace(
@@ -149,13 +152,14 @@ class Plan:
 
     def _flown(
         self, flights: list[Flight], recordings: Path | None, store: UnitStore, crew: Crew
-    ) -> list[Finished]:
-        """The units of each flight, those of the primary setup first."""
+    ) -> list[list[Finished]]:
+        """The units of each flight, that of the primary setup first."""
         made: dict[str, Path] = {}
         if recordings is not None:
             made = {path.name: path for path in recorded(flights, recordings, crew)}
         units = [self.units(flight, made) for flight in flights]
-        return measure([unit for of_flight in units for unit in of_flight], store, crew)
+        finished = iter(measure([unit for of_flight in units for unit in of_flight], store, crew))
+        return [[next(finished) for _ in of_flight] for of_flight in units]
 
 
 def _sequences(finished: Sequence[Finished]) -> int:
