@@ -10,7 +10,7 @@ import numpy as np
 
 from airground.config import Config
 from airground.io.recording import Recording
-from airground.warm_up import warm_up
+from airground.warm_up import warm_up_mapping
 from evaluation.bench.curves import CURVES_BY_NAME, CurvePoint
 from evaluation.bench.material import Material, Played, play
 from evaluation.bench.memory import peak_memory_mib
@@ -26,12 +26,12 @@ class Opened:
 
     Attributes:
         speed: What its cores can do.
-        played: The pipeline's run over the recording.
-        peak_memory_mib: That this added; None where nobody counts it.
+        played: The pipeline's run over the recording; None where it was not played to its end.
+        peak_memory_mib: That this added, in all processes; None where nobody counts it.
     """
 
     speed: Speed
-    played: Played
+    played: Played | None
     peak_memory_mib: float | None
 
 
@@ -118,8 +118,10 @@ def open_lane(path: Path, whole: bool) -> tuple[Lane, Opened]:
     """
     speed = probe()
     recording, config = Recording.open(path), Config()
-    warm_up(config, np.random.default_rng(0))
-    kept: list[tuple[Material, Played]] = []
+    warm_up_mapping(config, np.random.default_rng(0))
+    kept: list[tuple[Material, Played | None]] = []
     peak = peak_memory_mib(lambda: kept.append(play(recording, config, whole)))
     material, played = kept[0]
+    if peak is not None and played is not None:
+        peak += played.tracking_memory_mib
     return Lane(material), Opened(speed.at_least(probe()), played, peak)

@@ -30,14 +30,15 @@ from airground.core.se3 import SE3
 from airground.core.surface import AerialSurface, DepthMap
 from airground.dense.view_selection import PosedImage
 from airground.errors import InputError
-from airground.io.read_ahead import run_ahead
 from airground.io.recording import Recording
 from airground.pipeline import Pipeline, Sighting, sight
-from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
-from airground.tracking import FrontEnds, Trackers
 from evaluation.bench.memory import resident_mib
-from evaluation.runs.recording import FRAMES_AHEAD
-from evaluation.runs.watched_front_end import WatchedFrontEnd
+from evaluation.protocol.setups import Setup
+from evaluation.realtime.drops import nothing_dropped
+from evaluation.runs.recording import pipeline_rng
+from evaluation.runs.tracking import TrackingTask
+from evaluation.runs.tracking_process import TrackingProcess
+from sim.truth import Truth
 
 PARTS = 10
 """Memory is looked at so many times over a recording."""
@@ -105,9 +106,9 @@ class Played:
         frame_ms: By robot ("mav", "ground"): each image with the inertial samples before it.
         recorded_s: How much was played.
         processing_s: By the clock, decoding included.
-        cpu_s: Of the whole process.
-        resident_mib: What the process held after each of ten parts; fewer if it was cut short
-            or nobody counts it.
+        cpu_s: Of mapping and tracking.
+        resident_mib: What both processes held after each of ten parts; none if nobody counts it.
+        tracking_memory_mib: The most that tracking ever held.
     """
 
     frame_ms: dict[str, list[float]]
@@ -115,46 +116,51 @@ class Played:
     processing_s: float
     cpu_s: float
     resident_mib: list[float]
+    tracking_memory_mib: float
 
 
-def play(recording: Recording, config: Config, whole: bool) -> tuple[Material, Played]:
-    """Run the pipeline with SLAM over a recording, and keep what the rows need.
+def play(recording: Recording, config: Config, whole: bool) -> tuple[Material, Played | None]:
+    """Run the pipeline with SLAM over a recording, as `run` does, and keep what the rows need.
 
     Args:
         recording: Of both robots.
         config: The pipeline's parameters.
-        whole: To its end; else only until the material is there.
+        whole: To its end; else only until the material is there, and nothing is told of how
+            long it took.
 
     Raises:
         InputError: No aerial surface could be aligned, so that there is nothing to work on.
     """
-    mav_rng, ground_rng, rng = np.random.default_rng(0).spawn(3)
-    mav = WatchedFrontEnd(make_front_end(MAV, "slam", Ingredients(recording.mav, config, mav_rng)))
-    ground = WatchedFrontEnd(
-        make_front_end(GROUND, "slam", Ingredients(recording.ground, config, ground_rng))
-    )
-    trackers = Trackers(recording.mav, recording.ground, FrontEnds(mav, ground))
-    pipeline = Pipeline(config, recording.mav, recording.ground, rng)
+    truth = Truth.open(recording.path)  # only oracles would look at it
+    task = TrackingTask(recording, truth, Setup(config), 0, nothing_dropped(recording))
+    pipeline = Pipeline(config, recording.mav, recording.ground, pipeline_rng(0))
     gathering = _Gathering(recording, config, pipeline)
-    memory = MemoryLog(recording)
-    started, cpu = time.perf_counter(), time.process_time()
-    frames = trackers.frames(recording.messages())
-    for event in pipeline.run(run_ahead(frames, FRAMES_AHEAD)):
-        gathering.take(event)
-        memory.take(event)
-        if gathering.complete and not whole:
-            break
-    processing_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu
-    frame_ms = {"mav": mav.durations_ms, "ground": ground.durations_ms}
+    with TrackingProcess(task) as tracking:
+        memory = MemoryLog(recording, tracking.pid)
+        tracking.wait_until_ready()
+        started, cpu = time.perf_counter(), time.process_time()
+        for event in pipeline.run(tracking.frames()):
+            gathering.take(event)
+            memory.take(event)
+            if gathering.complete and not whole:
+                return gathering.material(), None
+        report = tracking.report()
+        processing_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu
     return gathering.material(), Played(
-        frame_ms, recording.duration_s, processing_s, cpu_s, memory.resident_mib
+        {robot: one.front_end.durations_ms for robot, one in report.tracked.items()},
+        recording.duration_s,
+        processing_s,
+        cpu_s + report.processor_s,
+        memory.resident_mib,
+        report.peak_memory_mib,
     )
 
 
 class MemoryLog:
     """Listens to the pipeline, and looks at the memory after each part of the recording."""
 
-    def __init__(self, recording: Recording) -> None:
+    def __init__(self, recording: Recording, tracking: int | str) -> None:
+        self._processes = ("self", tracking)
         stamps_ns = recording.stamps_ns(Source.GROUND)
         first_ns, last_ns = int(stamps_ns[0]), int(stamps_ns[-1])
         ends_ns = np.linspace(first_ns, last_ns, PARTS + 1)[1:]
@@ -165,7 +171,7 @@ class MemoryLog:
         ground = isinstance(event, GroundTracked)
         while ground and self._waiting_ns and event.stamp_ns >= self._waiting_ns[0]:
             self._waiting_ns.pop(0)
-            now_mib = resident_mib()
+            now_mib = resident_mib(*self._processes)
             self.resident_mib += [] if now_mib is None else [now_mib]
 
 

@@ -31,19 +31,19 @@ def peak_memory_mib(call: Callable[[], object]) -> float | None:
         return None
 
 
-def resident_mib() -> float | None:
-    """What is resident now [MiB]; None where nobody counts it."""
+def resident_mib(*processes: int | str) -> float | None:
+    """What these processes ("self", or by number) hold now [MiB]; None where nobody counts it."""
     try:
-        return _kib("VmRSS") / 1024
+        return sum(_kib("VmRSS", Path(f"/proc/{one}/status")) for one in processes) / 1024
     except OSError:
         return None
 
 
-def _kib(key: str) -> int:
-    for line in STATUS.read_text(encoding="ascii").splitlines():
+def _kib(key: str, status: Path = STATUS) -> int:
+    for line in status.read_text(encoding="ascii").splitlines():
         if line.startswith(f"{key}:"):
             return int(line.split()[1])
-    raise OSError(f"{STATUS} has no {key}")
+    raise OSError(f"{status} has no {key}")
 
 
 def _hand_back() -> None:

@@ -14,6 +14,7 @@ from evaluation.bench.curves import CURVES, Curve, CurvePoint, exponent
 from evaluation.bench.lane import Facts, Opened
 from evaluation.bench.lane_process import lane_processes
 from evaluation.bench.load import LoadAverage, LoadMeter, load_average
+from evaluation.bench.material import Played
 from evaluation.bench.report import (
     SCHEMA,
     BenchReport,
@@ -83,7 +84,8 @@ def run_benchmark(
         one_core = opened[1].speed
         speeds = {count: one.speed.at_least(one_core) for count, one in opened.items()}
         lanes: dict[int, AnyLane] = {process.threads: process for process in processes}
-        rows = [played_row(name, opened) for name in names if name in PLAYED]
+        played = {count: one.played for count, one in opened.items() if one.played is not None}
+        rows = [played_row(name, played) for name in names if name in PLAYED]
         for name in names:
             if name in BY_NAME:
                 say(BY_NAME[name].stage.title)
@@ -161,12 +163,12 @@ def timed_row(
     )
 
 
-def played_row(name: str, opened: dict[int, Opened]) -> RowResult:
+def played_row(name: str, played: dict[int, Played]) -> RowResult:
     """A row that was timed image by image while the recording was played."""
     stage, robot, target_ms = PLAYED[name]
     lanes = [
-        LaneTiming(threads=count, timing=Timing.of_wall(one.played.frame_ms[robot]))
-        for count, one in sorted(opened.items())
+        LaneTiming(threads=count, timing=Timing.of_wall(one.frame_ms[robot]))
+        for count, one in sorted(played.items())
     ]
     return RowResult(
         name=name,
@@ -203,14 +205,15 @@ def _real_time(opened: dict[int, Opened]) -> list[RealTime]:
     return [
         RealTime(
             threads=count,
-            recorded_s=one.played.recorded_s,
-            processing_s=one.played.processing_s,
-            cpu_s=one.played.cpu_s,
-            real_time_factor=one.played.recorded_s / one.played.processing_s,
+            recorded_s=played.recorded_s,
+            processing_s=played.processing_s,
+            cpu_s=played.cpu_s,
+            real_time_factor=played.recorded_s / played.processing_s,
             peak_memory_mib=one.peak_memory_mib,
-            resident_mib=one.played.resident_mib,
+            resident_mib=played.resident_mib,
         )
         for count, one in sorted(opened.items())
+        if (played := one.played) is not None
     ]
 
 

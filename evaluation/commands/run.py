@@ -106,4 +106,4 @@ class Run(Verb, OwnWords, AloneWords, RealtimeWords, LookWords, SetupWords, Seed
         drops = nothing_dropped(recording)
         if self.drops is not None:
             drops = DropList.read(self.drops, recording)
-        return run_recording(recording, truth, setup, seed, drops, onlookers), drops
+        return run_recording(recording, truth, setup, seed, drops, onlookers, apart=True), drops

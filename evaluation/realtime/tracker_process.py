@@ -26,7 +26,7 @@ from evaluation.realtime.player import Played, play
 from evaluation.realtime.radio import Radio, RadioLimits
 from evaluation.realtime.uplink import Uplink
 from evaluation.runs.front_ends import front_ends_for
-from evaluation.runs.recording import front_end_rng
+from evaluation.runs.tracking import front_end_rng
 from evaluation.runs.watched_front_end import FrontEndLog
 from sim.truth import Truth
 

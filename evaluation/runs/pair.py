@@ -25,7 +25,8 @@ from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
 from airground.tracking import FrontEnds, Trackers
 from evaluation.protocol.setups import Setup
 from evaluation.runs.alone import error_against, of_pose_frame
-from evaluation.runs.recording import front_end_rng, pipeline_rng
+from evaluation.runs.recording import pipeline_rng
+from evaluation.runs.tracking import front_end_rng
 from evaluation.runs.watched_front_end import WatchedFrontEnd
 from evaluation.truth.camera import true_camera
 from evaluation.truth.tracking_quality import Tracked
