@@ -3,7 +3,7 @@ PYTHON_IN_VENV := .venv/bin/python
 READY := .venv/.ready
 OUT ?= results/demo
 
-.PHONY: demo setup test test-slow check regression format clean
+.PHONY: demo setup test test-slow check docs regression format clean
 
 demo: $(READY)
 	rm -rf $(OUT)
@@ -26,6 +26,11 @@ check: $(READY)
 	$(PYTHON_IN_VENV) -m ruff check .
 	$(PYTHON_IN_VENV) -m ruff format --check .
 	$(PYTHON_IN_VENV) -m mypy
+
+# The pages of docs/ with the API reference, to read in a browser: results/docs/index.html.
+docs: $(READY)
+	$(PYTHON_IN_VENV) docs/parameters.py
+	.venv/bin/sphinx-build -W --keep-going -q -b html docs results/docs
 
 # Did a change make it worse? Against evaluation/accepted.json; docs/check_a_change.md.
 regression: OUT = results/regression

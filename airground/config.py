@@ -17,7 +17,7 @@ Count = Annotated[int, Field(ge=1)]
 class Section(BaseModel):
     """A frozen group of parameters that refuses keys it does not know."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
 
 class KeyframeSlam(Section):
@@ -63,6 +63,7 @@ class RgbdSlam(KeyframeSlam):
     """The ground robot's SLAM: colour and depth."""
 
     keyframe_parallax_px: Positive = 40.0
+    """A frame becomes a keyframe when its points moved this far, turning apart [px] ..."""
     depth_noise_per_m: Positive = 0.003
     """Standard deviation of inverse depth as measured [1/m]."""
     max_depth_m: Positive = 5.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 from pathlib import Path
 
 import pytest
@@ -74,3 +75,20 @@ def test_every_page_can_be_reached_from_the_readme() -> None:
                 if (base / link).exists():
                     to_read.append((base / link).resolve())
     assert {page.resolve() for page in PAGES} <= reached
+
+
+def test_the_table_of_parameters_is_up_to_date() -> None:
+    made = runpy.run_path(str(ROOT / "docs" / "parameters.py"))["page"]()
+    page = (ROOT / "docs" / "parameters.md").read_text(encoding="utf-8")
+    assert page == made, "config.py has changed: run docs/parameters.py, or make docs"
+
+
+def test_every_parameter_is_explained() -> None:
+    bare = [
+        f"{section}.{name}"
+        for section, owner in SECTIONS.items()
+        if isinstance(owner, BaseModel)
+        for name, field in type(owner).model_fields.items()
+        if not field.description
+    ]
+    assert bare == []

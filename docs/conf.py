@@ -1,0 +1,56 @@
+"""Settings of Sphinx: `make docs` builds these pages and the API reference, offline."""
+
+from pydantic import BaseModel
+from sphinx.application import Sphinx
+
+from airground import __version__
+from evaluation.environment import prepare
+
+prepare()  # Modules are imported for their docstrings; MuJoCo wants to know how to render.
+
+project = "airground"
+author = "the airground authors"
+release = __version__
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+html_theme = "furo"
+html_title = f"airground {release}"
+
+# Links to headings as GitHub names them. Links to files outside this folder, such as
+# ../airground/config.py, become copies to download.
+myst_heading_anchors = 4
+
+highlight_language = "none"  # Blocks without a language are commands or listings.
+
+autodoc_default_options = {
+    "members": True,
+    "member-order": "bysource",
+    "exclude-members": "model_config",
+}
+autodoc_typehints = "signature"
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True
+
+
+def setup(app: Sphinx) -> None:
+    """Hook in where docstrings and signatures would be misread."""
+    app.connect("autodoc-process-docstring", keep_colons, priority=400)  # napoleon's is 500
+    app.connect("autodoc-process-signature", without_constraints)
+
+
+def keep_colons(app: Sphinx, what: str, name: str, obj: object, options: dict, lines: list) -> None:
+    """Napoleon takes what stands before a colon under a constant for its type: an empty comment
+    as first line has none.
+    """
+    if what in ("attribute", "data") and lines:
+        lines[:0] = ["..", ""]
+
+
+def without_constraints(
+    app: Sphinx, what: str, name: str, obj: object, options: dict, *signature: str | None
+) -> tuple[str, None] | None:
+    """A pydantic model's signature spells out every constraint; its fields are listed below it."""
+    is_model = isinstance(obj, type) and issubclass(obj, BaseModel)
+    return ("", None) if is_model else None
