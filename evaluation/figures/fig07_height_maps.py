@@ -21,11 +21,14 @@ def height_maps_figure(showcase: Showcase) -> Figure:
     aerial, ground = showcase.aerial_heights, showcase.ground_heights
     step = showcase.steps[0]
 
+    low, high = np.nanpercentile(aerial.heights, [1, 99])
+    span = max(high - low, 0.05)
     for axes, made, title in (
         (aerial_axes, aerial, "a  aerial height map"),
         (ground_axes, ground, "b  ground height map"),
     ):
-        low, high = np.nanpercentile(made.heights, [1, 99])
+        # One span for both: a colour is a height above the floor, and walls do not fade the heap.
+        low = np.nanpercentile(made.heights, 1)
         shown = draw_grid(
             axes,
             made.heights,
@@ -33,9 +36,9 @@ def height_maps_figure(showcase: Showcase) -> Figure:
             made.cells_per_m,
             HEIGHT_COLOURS,
             vmin=low,
-            vmax=max(high, low + 0.05),
+            vmax=low + span,
         )
-        figure.colorbar(shown, ax=axes, label="height [m]", shrink=0.9)
+        figure.colorbar(shown, ax=axes, label="height [m]", shrink=0.9, extend="max")
         axes.set_title(title)
     best = step.cost_map.best()
     if best is not None:
