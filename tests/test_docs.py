@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import re
 import runpy
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, get_args
 
 import pytest
 from pydantic import BaseModel
 
 from airground.config import Config
 from evaluation.cli import VERBS
+from evaluation.results.folder import CONFIG, SHOWCASE, SUMMARY, TABLE
+from evaluation.results.summary import Summary
+from evaluation.results.table import ResultTable
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -92,3 +97,43 @@ def test_every_parameter_is_explained() -> None:
         if not field.description
     ]
     assert bare == []
+
+
+def part_of(page: str, heading: str) -> str:
+    """The text under a heading of the second level."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    return text.partition(f"\n## {heading}\n")[2].partition("\n## ")[0]
+
+
+def named_in(text: str) -> set[str]:
+    return set(re.findall(r"`([^`]+)`", text))
+
+
+def keys(model: type[BaseModel]) -> Iterator[str]:
+    """Names in a JSON file of this form, at every depth."""
+    for name, field in model.model_fields.items():
+        yield field.alias or name
+        for part in parts(field.annotation):
+            yield from keys(part)
+
+
+def parts(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Models in an annotation: `Part | None`, `dict[str, Part]`."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for argument in get_args(annotation):
+        yield from parts(argument)
+
+
+def test_every_key_of_the_summary_is_explained() -> None:
+    assert set(keys(Summary)) - named_in(part_of("formats.md", "summary.json")) == set()
+
+
+def test_every_column_of_the_results_is_explained() -> None:
+    columns = set(ResultTable.from_rows([]).frame.columns)
+    assert columns - named_in(part_of("formats.md", "results.parquet")) == set()
+
+
+def test_every_file_of_a_run_is_explained() -> None:
+    files = named_in(part_of("formats.md", "What a run leaves"))
+    assert {TABLE, SUMMARY, CONFIG, f"{SHOWCASE}/"} <= files

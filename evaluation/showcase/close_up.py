@@ -7,6 +7,7 @@ import numpy as np
 from airground.core.belief import Belief, CostMap
 from airground.core.cloud import PointCloud, Source
 from airground.core.events import (
+    Aligned,
     BeliefUpdated,
     CostMapComputed,
     DepthMapMade,
@@ -44,6 +45,7 @@ class CloseUp:
         self._cost_map: CostMap | None = None
         self._sightings: list[Sighting] = []
         self._steps: list[LocalizationStep] = []
+        self._refined: SE3 | None = None
 
     def see(self, seen: Seen) -> None:
         """Keep what belongs to the first aerial maps."""
@@ -62,6 +64,8 @@ class CloseUp:
             case BeliefUpdated(belief=belief) if seen.sighting is not None:
                 self._sightings.append(seen.sighting)
                 self._steps.append(self._step(belief, seen.sighting))
+            case Aligned(alignment=alignment) if len(self._steps) == 1 and alignment.accepted:
+                self._refined = alignment.T_ground_mav
 
     def showcase(self, result: RunResult) -> Showcase | None:
         """What was kept, with the map that the run left; None if nothing was located."""
@@ -92,6 +96,7 @@ class CloseUp:
             ground_path=path_in_ground(result.tracked["ground"], SE3.identity()),
             mav_image=self._recording.mav_image_at(surface.reference_stamp_ns).image,
             ground_image=self._recording.ground_image_at(shown.ground_stamp_ns).colour,
+            T_ground_mav=self._refined,
         )
 
     def _step(self, belief: Belief, sighting: Sighting) -> LocalizationStep:

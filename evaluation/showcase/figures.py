@@ -14,6 +14,7 @@ from evaluation.figures.fig05_15_augmented import augmented_figure
 from evaluation.figures.fig06_depth_maps import depth_maps_figure
 from evaluation.figures.fig07_height_maps import height_maps_figure
 from evaluation.figures.fig08_particles import particles_figure
+from evaluation.figures.refinement import refinement_figure
 from evaluation.showcase.scene_pictures import (
     aerial_viewpoint,
     render_augmented_map,
@@ -42,7 +43,7 @@ class ReportFigure:
 
 
 def showcase_figures(showcase: Showcase) -> Iterator[ReportFigure]:
-    """Fig. 2, 3, 5 and 15, 6, 7 and 8 of one flight."""
+    """Fig. 2, 3, 5 and 15, 6, 7 and 8 of one flight, and a refinement."""
     conditions = f"Scene {showcase.scene}; {showcase.condition}."
     yield ReportFigure(
         "fig02_views",
@@ -84,6 +85,15 @@ def showcase_figures(showcase: Showcase) -> Iterator[ReportFigure]:
         "the truth. Behind them the cost of every position. " + conditions,
         particles_figure(showcase.steps),
     )
+    if showcase.T_ground_mav is not None:
+        yield ReportFigure(
+            "refinement",
+            "Section VII: one refinement",
+            "A cut through both maps, 3 cm thick, where the ground robot's map has most of the "
+            "heap: the aerial surface as the particles place it, and as refinement does. The "
+            f"paper shows no such picture. {conditions}",
+            refinement_figure(showcase, showcase.T_ground_mav),
+        )
 
 
 def _matches(matched: MatchedImages, conditions: str) -> ReportFigure:

@@ -52,6 +52,8 @@ def make_showcase(
     heights, steps = _localization_steps(sightings[:PANELS], truth, setup.config, seed)
     aerial_cloud, T_ground_mav = _augmented(sightings, steps[-1].belief.T_ground_mav, setup.config)
     chosen = spread_out(maps.depth_maps[first], PANELS)
+    start = steps[0].belief.T_ground_mav
+    refined = refine(surface.stamp_ns, start, surface.cloud_mav, shown.ground_cloud, setup.config)
     return Showcase(
         scene=recording.scene,
         condition=setup.condition(recording.sensors).label(),
@@ -71,6 +73,7 @@ def make_showcase(
         mav_image=recording.mav_image_at(surface.reference_stamp_ns).image,
         ground_image=recording.ground_image_at(shown.ground_stamp_ns).colour,
         matched=_matched(recording, truth, maps, shown, seed) if match else None,
+        T_ground_mav=refined.T_ground_mav if refined.accepted else None,
     )
 
 

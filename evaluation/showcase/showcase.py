@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from airground.core.arrays import read_only
 from airground.core.belief import Belief, CostMap, HeightMap
 from airground.core.cloud import PointCloud
+from airground.core.se3 import SE3
 from airground.core.surface import AerialSurface, DepthMap
 from airground.core.trajectory import Trajectory
 from airground.errors import InputError
@@ -64,6 +65,7 @@ class Showcase:
         mav_image: (h, w) or (h, w, 3) uint8, a view of the MAV.
         ground_image: (h, w, 3) uint8, a view of the ground robot.
         matched: What ASIFT finds between both robots' images; None where not asked for.
+        T_ground_mav: The refined alignment of `surface`; None where it was refused.
     """
 
     scene: str
@@ -84,6 +86,7 @@ class Showcase:
     mav_image: NDArray[np.uint8]
     ground_image: NDArray[np.uint8]
     matched: MatchedImages | None = None
+    T_ground_mav: SE3 | None = None
 
     def __post_init__(self) -> None:
         if len(self.depth_errors) != len(self.depth_maps):
@@ -110,7 +113,8 @@ class Showcase:
             archive.put(name, getattr(self, name))
         for name in ("surface", "aerial_heights", "ground_heights", "mav_path", "ground_path"):
             archive.put(name, getattr(self, name))
-        archive.put("matched", self.matched)
+        for name in ("matched", "T_ground_mav"):
+            archive.put(name, getattr(self, name))
         for name in ("depth_maps", "depth_errors", "steps"):
             archive.put(f"{name}.count", len(getattr(self, name)))
             for i, item in enumerate(getattr(self, name)):
@@ -153,6 +157,7 @@ def _fields(archive: Archive) -> dict[str, Any]:
         "depth_maps": archive.several("depth_maps", DepthMap),
         "steps": archive.several("steps", LocalizationStep),
         "matched": archive.get("matched", MatchedImages) if archive.has("matched") else None,
+        "T_ground_mav": archive.get("T_ground_mav", SE3) if archive.has("T_ground_mav") else None,
     }
     for name in ("surface_error", "aerial_reference", "mav_image", "ground_image"):
         fields[name] = archive.array(name)

@@ -1,5 +1,6 @@
 """Figures show what the data says: failures, medians, orientation, true colours."""
 
+import dataclasses
 import hashlib
 from pathlib import Path
 
@@ -7,6 +8,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from airground.core.cloud import PointCloud
+from airground.core.se3 import SE3
 from evaluation.figures.before_after import BeforeAfter
 from evaluation.figures.boxes import draw_box, log_axis
 from evaluation.figures.fig06_depth_maps import completeness, depth_maps_figure
@@ -15,6 +18,7 @@ from evaluation.figures.fig08_particles import covariance_ellipse, particles_fig
 from evaluation.figures.fig11_localization_error import localization_error_figure
 from evaluation.figures.fig13_refinement_translation import refinement_translation_figure
 from evaluation.figures.maps import draw_grid
+from evaluation.figures.refinement import refinement_figure
 from evaluation.figures.style import save_figure
 from evaluation.figures.table1_timing import timing_figure
 from evaluation.showcase.showcase import Showcase
@@ -104,6 +108,27 @@ def test_the_ellipse_follows_the_covariance(angle: float) -> None:
 
 def test_completeness_is_the_share_of_pixels_with_depth() -> None:
     assert completeness(np.array([[0.1, np.nan], [np.nan, np.nan]])) == 0.25
+
+
+def test_refinement_is_cut_where_both_maps_have_the_heap(showcase: Showcase) -> None:
+    def cloud(*heaps: tuple[float, float]) -> PointCloud:
+        """A floor of 2 x 2 m with heaps, 0.3 m square and high, at (x, y)."""
+        x, y = (axis.ravel() for axis in np.meshgrid(*[np.linspace(-1, 1, 101)] * 2))
+        near = [(abs(x - hx) <= 0.15) & (abs(y - hy) <= 0.15) for hx, hy in heaps]
+        z = 0.3 * np.any(near, axis=0)
+        return PointCloud(np.stack([x, y, z], axis=1), np.zeros((len(x), 3), np.uint8))
+
+    shift = SE3(np.eye(3), np.array([0.2, 0.0, 0.1]))
+    surface = dataclasses.replace(showcase.surface, cloud_mav=cloud((0.0, 0.5), (0.5, -0.8)))
+    seen = cloud((0.2, 0.5), (-0.5, 0.0))  # the first heap, where `shift` puts it, and another
+    seen = dataclasses.replace(seen, points=seen.points + np.array([0, 0, 0.1], np.float32))
+    both = dataclasses.replace(showcase, surface=surface, ground_cloud=seen)
+    before, after = refinement_figure(both, shift).axes
+    for axes, offset in ((before, 0.2), (after, 0.0)):
+        aerial, ground = (np.asarray(drawn.get_offsets()) for drawn in axes.collections)
+        tops = [points[points[:, 1] > points[:, 1].min() + 0.2, 0] for points in (aerial, ground)]
+        assert tops[1].min() == pytest.approx(0.05, abs=0.03)
+        assert tops[1].min() - tops[0].min() == pytest.approx(offset, abs=0.03)
 
 
 def test_pictures_of_a_flight_state_their_numbers(showcase: Showcase) -> None:

@@ -73,6 +73,7 @@ def test_it_keeps_what_the_events_carried(kept: Showcase) -> None:
     (step,) = kept.steps
     assert step.belief is run.BELIEF
     assert step.cost_map is run.COSTS
+    assert kept.T_ground_mav is run.T_GROUND_MAV
     np.testing.assert_allclose(step.true_u, (run.T_GROUND_MAV @ run.DOWN.translation)[:2])
     np.testing.assert_allclose(np.nanmedian(kept.depth_errors[0]), 0.02, atol=1e-6)
     assert len(kept.ground_cloud) == 1

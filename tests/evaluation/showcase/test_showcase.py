@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from airground.core.cloud import PointCloud
+from airground.core.se3 import SE3
 from airground.errors import InputError
 from evaluation.baselines.matched_images import MatchedImages
 from evaluation.showcase.scene_pictures import (
@@ -49,6 +50,12 @@ def test_matched_images_are_read_back_as_written(showcase: Showcase, tmp_path: P
     matched = MatchedImages(image, image, pixels, pixels, np.array([True, False]), 3, False)
     dataclasses.replace(showcase, matched=matched).save(tmp_path)
     assert _same(Showcase.load(tmp_path).matched, matched)
+
+
+def test_the_refined_alignment_is_read_back_as_written(showcase: Showcase, tmp_path: Path) -> None:
+    refined = SE3.from_heading(0.1)
+    dataclasses.replace(showcase, T_ground_mav=refined).save(tmp_path)
+    assert _same(Showcase.load(tmp_path).T_ground_mav, refined)
 
 
 def test_nothing_is_pickled(showcase: Showcase, tmp_path: Path) -> None:
