@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from evaluation.report.failures import control_table, failure_table
+from evaluation.report.figures import report_figures
 from evaluation.report.headline import headlines
 from evaluation.report.page import write_report
 from evaluation.report.tables import (
@@ -45,6 +46,16 @@ def test_the_page_needs_nothing_from_outside(page: tuple[Path, str]) -> None:
     assert re.findall(r'(?:src|href)="(?!data:|#)[^"]*"', html) == []
     assert "<script" not in html
     assert not re.search(r"url\(|@import", html)
+
+
+def test_captions_say_where_refinements_started(table: ResultTable) -> None:
+    def captions(shown: ResultTable) -> list[str]:
+        drawn = report_figures(shown, [BEST], None)
+        return [figure.caption for figure in drawn if "refinement" in figure.name]
+
+    of_a_run = table.frame[~table.frame["metric"].str.startswith("from_truth")]
+    assert all("start from the true pose with Gaussian noise" in c for c in captions(table))
+    assert all("where the particles place it" in c for c in captions(ResultTable(of_a_run)))
 
 
 def test_every_figure_is_embedded_and_saved(page: tuple[Path, str]) -> None:
