@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
 from airground.errors import InputError
 from evaluation.commands.words import OutWord, Verb
+
+if TYPE_CHECKING:
+    from evaluation.showcase.showcase import Showcase
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -21,6 +24,8 @@ class Gallery(Verb, OutWord):
 
     run: Annotated[Positional[Path], arg(metavar="RUN")]
     """A folder that run --rerun or reproduce has written."""
+    animation: bool = False
+    """Also draw how the first aerial surface finds its place, as an animated WebP."""
 
     def main(self) -> None:
         from evaluation.figures.style import save_picture
@@ -36,3 +41,13 @@ class Gallery(Verb, OutWord):
             for drawn in report_figures(table, table.conditions(), results.showcase):
                 save_picture(drawn.figure, folder, drawn.name)
                 print(f"{drawn.name}.png: {drawn.title}")
+            if self.animation:
+                self._animate(folder, results.showcase)
+
+    def _animate(self, folder: Path, showcase: Showcase) -> None:
+        from evaluation.showcase.landing import save_landing
+
+        if showcase.T_ground_mav is None:
+            raise InputError(f"{self.run}: --animation: its surface was not aligned")
+        save_landing(folder / "landing.webp", showcase, showcase.T_ground_mav)
+        print("landing.webp: the first aerial surface finds its place")

@@ -36,6 +36,7 @@ def names_after(example: str, folder: Path) -> dict[str, Any]:
     return runpy.run_path(str(script))
 
 
+@pytest.mark.slow
 def test_a_recording_is_made_with_the_preset(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

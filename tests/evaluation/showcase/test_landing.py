@@ -1,0 +1,44 @@
+"""The animation ends where refinement does, and is a file that browsers play."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from airground.core.se3 import SE3
+from airground.pipeline import moved
+from evaluation.showcase import landing as module
+from evaluation.showcase.landing import END_MS, MAP_PX, PAUSE_MS, landing, save_landing
+from evaluation.showcase.scene_pictures import render_augmented_map
+from evaluation.showcase.showcase import Showcase
+from tests.evaluation.synthetic_results import make_showcase
+
+REFINED = SE3.from_heading(0.05, (0.1, 0.0, 0.0))
+
+
+@pytest.fixture
+def showcase(monkeypatch: pytest.MonkeyPatch) -> Showcase:
+    monkeypatch.setattr(module, "FALLING", 2)
+    monkeypatch.setattr(module, "SETTLING", 1)
+    return make_showcase(scale=8)
+
+
+def test_it_pauses_at_the_guess_and_ends_at_the_alignment(showcase: Showcase) -> None:
+    falling, guessed, refined = landing(showcase, REFINED)
+    assert (guessed.duration_ms, refined.duration_ms) == (PAUSE_MS, END_MS)
+    cloud = showcase.surface.cloud_mav
+    view = module._viewpoint(REFINED @ cloud.points)
+    for frame, T in ((guessed, showcase.steps[0].belief.T_ground_mav), (refined, REFINED)):
+        there = replace(showcase, aerial_cloud=moved(cloud, T))
+        drawn = frame.picture[-MAP_PX[1] :]
+        np.testing.assert_array_equal(drawn, render_augmented_map(there, view, MAP_PX))
+    assert (falling.picture != guessed.picture).any()
+
+
+def test_it_is_written_as_an_animation(showcase: Showcase, tmp_path: Path) -> None:
+    save_landing(tmp_path / "landing.webp", showcase, REFINED)
+    with Image.open(tmp_path / "landing.webp") as picture:
+        assert picture.n_frames == 3  # type: ignore[attr-defined]
+        assert picture.width == module.WIDTH_PX
