@@ -66,6 +66,14 @@ def test_verbs_exist(page: Path) -> None:
     assert set(verbs) <= set(VERBS)
 
 
+def test_the_index_links_every_page() -> None:
+    text = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    linked = set(re.findall(r"\]\((\w+\.md)\)", text))
+    pages = {page.name for page in (ROOT / "docs").glob("*.md")}
+    behind_the_api = {name for name in pages if name.startswith("api_")}
+    assert pages - behind_the_api - {"index.md"} == linked
+
+
 def test_every_page_can_be_reached_from_the_readme() -> None:
     reached, to_read = set(), [ROOT / "README.md"]
     while to_read:

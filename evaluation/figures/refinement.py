@@ -62,10 +62,11 @@ def _liveliest_cut(ground: NDArray, aerial: NDArray) -> float:
     """The y at which most of what stands above the floor is in both maps."""
     low, high = aerial.min(axis=0), aerial.max(axis=0)
     above = np.percentile(aerial[:, 2], 5) + ABOVE_FLOOR_M
-    edges = [np.arange(low[i], high[i] + CUT_M, CUT_M) for i in (0, 1)]
-    cells = [
-        np.histogram2d(*points[points[:, 2] > above, :2].T, bins=edges)[0] > 0
-        for points in (ground, aerial)
-    ]
-    shared = (cells[0] & cells[1]).sum(axis=0)
-    return float(edges[1][shared.argmax()] + CUT_M / 2)
+    x_edges, y_edges = (np.arange(low[i], high[i] + 2 * CUT_M, CUT_M) for i in (0, 1))
+
+    def filled(points: NDArray) -> NDArray:
+        x, y = points[points[:, 2] > above, :2].T
+        return np.histogram2d(x, y, bins=[x_edges, y_edges])[0] > 0
+
+    shared = (filled(ground) & filled(aerial)).sum(axis=0)
+    return float(y_edges[shared.argmax()] + CUT_M / 2)
