@@ -82,5 +82,5 @@ def test_the_baseline_answers_over_the_scene(copy: Path) -> None:
     errors = answers[answers.metric == "heap_horizontal_m"].value
     assert len(errors) == 2
     assert np.isfinite(errors).all()
-    assert (errors < 3.0).all()  # the size of the region that it was told to search
+    assert (errors < 1.0).all()  # in a square of 6 m
     assert "highest on highest" in (copy / "heap" / "report.html").read_text(encoding="utf-8")
