@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from airground.config import Config
 from airground.core.se3 import SE3
 from airground.pipeline import moved
+from evaluation import cli
+from evaluation.results.folder import Results
 from evaluation.showcase import landing as module
 from evaluation.showcase.landing import END_MS, MAP_PX, PAUSE_MS, landing, save_landing
 from evaluation.showcase.scene_pictures import render_augmented_map
 from evaluation.showcase.showcase import Showcase
-from tests.evaluation.synthetic_results import make_showcase
+from tests.evaluation.synthetic_results import make_showcase, make_table
 
 REFINED = SE3.from_heading(0.05, (0.1, 0.0, 0.0))
 
@@ -42,3 +45,22 @@ def test_it_is_written_as_an_animation(showcase: Showcase, tmp_path: Path) -> No
     with Image.open(tmp_path / "landing.webp") as picture:
         assert picture.n_frames == 3  # type: ignore[attr-defined]
         assert picture.width == module.WIDTH_PX
+
+
+@pytest.mark.parametrize("refined", [None, REFINED])
+def test_the_gallery_has_it_where_the_surface_was_aligned(
+    showcase: Showcase,
+    refined: SE3 | None,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    kept = replace(showcase, T_ground_mav=refined)
+    results = Results(make_table(), Config(), seed=0, showcase=kept)
+    monkeypatch.setattr("evaluation.results.folder.read_results", lambda folder: results)
+    monkeypatch.setattr("evaluation.report.figures.report_figures", lambda *drawn: [])
+    with pytest.raises(SystemExit) as exit_:
+        cli.main(["gallery", "results/a", "--out", str(tmp_path / "film"), "--animation"])
+    assert (exit_.value.code == 0) == (refined is not None)
+    assert (tmp_path / "film" / "landing.webp").exists() == (refined is not None)
+    assert ("was not aligned" in capsys.readouterr().err) == (refined is None)
