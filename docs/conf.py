@@ -32,6 +32,7 @@ autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
 napoleon_numpy_docstring = False
 napoleon_use_ivar = True
+napoleon_attr_annotations = False  # Docstrings state shapes and units, which types do not.
 
 
 def setup(app: Sphinx) -> None:
@@ -44,7 +45,7 @@ def keep_colons(app: Sphinx, what: str, name: str, obj: object, options: dict, l
     """Napoleon takes what stands before a colon under a constant for its type: an empty comment
     as first line has none.
     """
-    if what in ("attribute", "data") and lines:
+    if what in ("attribute", "data", "property") and lines:
         lines[:0] = ["..", ""]
 
 
