@@ -27,7 +27,7 @@ def comparison_figures(helds: Sequence[Against]) -> Iterator[ReportFigure]:
     yield from _differences(helds)
     runs = [helds[0].reference, *(held.run for held in helds)]
     drawn = [
-        Drawn(run.measured.condition, run.table.without_controls(), run.name, colour)
+        Drawn(run.measured.condition, run.table.without_controls(), _plain(run.name), colour)
         for run, colour in zip(runs, SERIES, strict=False)
     ]
     yield from localization_figures(drawn)
@@ -119,8 +119,13 @@ def _times(runs: Sequence[Run]) -> Iterator[ReportFigure]:
         "Times, as ratios",
         f"Median time of each stage over that of {reference.name}. No verdict: times depend on the "
         f"machine and on its load. {caveat} For times that compare, use airground bench.",
-        time_ratio_figure(ratios, [run.name for run in others], SERIES[1 : len(runs)]),
+        time_ratio_figure(ratios, [_plain(run.name) for run in others], SERIES[1 : len(runs)]),
     )
+
+
+def _plain(name: str) -> str:
+    """A name from outside as text in figures: a dollar would begin a formula."""
+    return name.replace("$", r"\$")
 
 
 def _ratio(before: np.ndarray, table: ResultTable, metric: str) -> float | None:

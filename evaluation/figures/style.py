@@ -41,7 +41,6 @@ STYLE: dict[str, Any] = {
     "grid.color": "#D9DCE0",
     "grid.linewidth": 0.7,
     "text.color": INK,
-    "text.parse_math": False,  # names of runs come from outside
     "xtick.color": "#3A3F45",
     "ytick.color": "#3A3F45",
     "legend.frameon": False,

@@ -21,22 +21,15 @@ from evaluation.compare.tables import (
     moved_table,
     overview_table,
 )
-from evaluation.regression.measured import Measured
 from evaluation.regression.verdict import Verdict, compare
-from evaluation.results.run_info import RunInfo
 from evaluation.results.summary import build_summary
 from evaluation.results.table import ResultTable
 from evaluation.settings import with_value, write_config
+from tests.evaluation.compare.made_runs import INFO, made_run
 from tests.evaluation.regression.flights import make_results
 
 SEEDS = range(10)
-INFO = RunInfo("0.1.0", "abc123", 0, "some CPU", 2)
 WORSE = {"error_median_m": 1.4}
-
-
-def run(name: str, table: ResultTable, info: RunInfo = INFO, config: Config | None = None) -> Run:
-    summary = build_summary(table, table.conditions()[0], info)
-    return Run(name, table, config or Config(), summary, Measured.of(table))
 
 
 def written(folder: Path, table: ResultTable, config: Config | None = None) -> Path:
@@ -56,11 +49,11 @@ def exit_code(*words: object) -> object:
 
 @pytest.fixture(scope="module")
 def before() -> Run:
-    return run("before", make_results(SEEDS))
+    return made_run("before", make_results(SEEDS))
 
 
 def test_the_verdicts_are_those_of_check(before: Run) -> None:
-    held = against(before, run("after", make_results(SEEDS, WORSE)))
+    held = against(before, made_run("after", make_results(SEEDS, WORSE)))
     checked = compare(before.measured, held.run.measured)
     assert repr(held.comparison) == repr(checked)
     (row,) = moved_table(held).rows
@@ -70,15 +63,15 @@ def test_the_verdicts_are_those_of_check(before: Run) -> None:
 
 
 def test_only_flights_of_both_are_compared_and_that_is_said(before: Run) -> None:
-    more = run("more", make_results(range(15), WORSE))
+    more = made_run("more", make_results(range(15), WORSE))
     held = against(before, more)
-    alone = against(before, run("alone", make_results(SEEDS, WORSE)))
+    alone = against(before, made_run("alone", make_results(SEEDS, WORSE)))
     assert repr(held.comparison.judged) == repr(alone.comparison.judged)
     assert any("5 that only one has are left out" in caveat for caveat in held.caveats())
 
 
 def test_other_seeds_are_two_samples_and_that_is_said(before: Run) -> None:
-    held = against(before, run("new", make_results(range(100, 110), {"error_median_m": 2.0})))
+    held = against(before, made_run("new", make_results(range(100, 110), {"error_median_m": 2.0})))
     assert [one.metric.name for one in held.comparison.of(Verdict.WORSE)] == ["surface_median"]
     assert "two samples" in held.caveats()[0]
     names = [figure.name for figure in comparison_figures([held])]
@@ -89,7 +82,7 @@ def test_other_seeds_are_two_samples_and_that_is_said(before: Run) -> None:
 def test_fewer_trials_are_noticed(before: Run) -> None:
     frame = make_results(SEEDS).frame
     fewer = frame[~((frame["stage"] == "refinement") & (frame["trial"] == 3))]
-    caveats = against(before, run("fewer", ResultTable(fewer))).caveats()
+    caveats = against(before, made_run("fewer", ResultTable(fewer))).caveats()
     assert caveats == [
         "Up to 3 refinement trials a flight against 4: what only one has counts as failed on the "
         "other."
@@ -101,10 +94,10 @@ def test_failures_that_came_and_went_are_told_apart(before: Run) -> None:
     errors = (frame["metric"] == "error_m") & (frame["iteration"] == 4)
     first = frame.index[errors & (frame["scene"] == "tiny")][0]
     frame.loc[first, "value"] = 2.0
-    moved = failures_moved(against(before, run("after", ResultTable(frame))))
+    moved = failures_moved(against(before, made_run("after", ResultTable(frame))))
     assert [failure.key for failure in moved.appeared] == [("sequence", "tiny", 0, 0, 0)]
     assert moved.appeared[0].story.rows[3][1] == "2.00 m"
-    back = failures_moved(against(run("after", ResultTable(frame)), before))
+    back = failures_moved(against(made_run("after", ResultTable(frame)), before))
     assert [failure.key for failure in back.went] == [("sequence", "tiny", 0, 0, 0)]
     assert moved.stayed == back.stayed
     assert back.appeared == []
@@ -113,7 +106,7 @@ def test_failures_that_came_and_went_are_told_apart(before: Run) -> None:
 def test_differences_of_parameters_machine_and_code_are_listed(before: Run) -> None:
     config = with_value(Config(), "localization", "particles", 77, "test")
     other = replace(INFO, cpu="another CPU", git_revision="def456")
-    runs = [before, run("after", before.table, other, config)]
+    runs = [before, made_run("after", before.table, other, config)]
     differing = {row[0]: row[1:] for row in difference_table(runs).rows}
     assert differing["localization.particles"][1] == "77"
     assert differing["machine"] == ("some CPU, 2 cores", "another CPU, 2 cores")
@@ -123,8 +116,8 @@ def test_differences_of_parameters_machine_and_code_are_listed(before: Run) -> N
 
 def test_several_runs_stand_in_one_overview(before: Run) -> None:
     helds = [
-        against(before, run("rough", make_results(SEEDS, WORSE))),
-        against(before, run("turned", make_results(SEEDS, {"after_rotation_deg": 0.5}))),
+        against(before, made_run("rough", make_results(SEEDS, WORSE))),
+        against(before, made_run("turned", make_results(SEEDS, {"after_rotation_deg": 0.5}))),
     ]
     overview = overview_table(helds)
     assert overview.header == ("metric", "before", "rough", "turned")
@@ -135,7 +128,7 @@ def test_several_runs_stand_in_one_overview(before: Run) -> None:
 
 
 def test_the_figure_draws_every_flight_s_difference(before: Run) -> None:
-    held = against(before, run("after", make_results(SEEDS, WORSE)))
+    held = against(before, made_run("after", make_results(SEEDS, WORSE)))
     figure = next(f for f in comparison_figures([held]) if f.name == "paired_differences").figure
     (axes,) = [one for one in figure.axes if one.get_title(loc="left")]
     assert axes.get_title(loc="left") == "surface, median error [mm]"

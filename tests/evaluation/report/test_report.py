@@ -108,6 +108,10 @@ def test_what_nobody_measured_has_no_row(table: ResultTable) -> None:
     assert "MAV poses, RMS error" not in names
 
 
+def test_poses_that_nobody_tracked_have_no_table(table: ResultTable) -> None:
+    assert trajectory_table(table, [BEST]).rows == ()
+
+
 def test_drift_is_shown_where_it_was_measured() -> None:
     rows = [Row("indoor_a", 1, 0, DRIFT, "trajectory", "mav_ate_se3_rmse_m", 0.0123, "m")]
     made = comparison_table(ResultTable.from_rows(rows), [DRIFT])
