@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from evaluation.figures.boxes import draw_box, log_axis, positions
-from evaluation.figures.style import PAPER, SERIES, styled
+from evaluation.figures.style import COLUMN_IN, PAPER, SERIES, SMALL_PT, styled
 from evaluation.statistics.intervals import quantile, with_failures
 
 
@@ -42,7 +42,7 @@ def before_after_figure(
         floor: Smallest value on the axis.
         colours: One a condition.
     """
-    figure = Figure(figsize=(4.6, 4.9), layout="constrained")
+    figure = Figure(figsize=(COLUMN_IN, 3.8), layout="constrained")
     axes = figure.subplots()
     log_axis(axes, [e for pair in trials.values() for e in (pair.before, pair.after)], floor)
     low, high = axes.get_ylim()
@@ -58,7 +58,7 @@ def before_after_figure(
     axes.set_xlim(-0.5, 1.5)
     axes.set_xticks([0, 1], ["before ICP", "after ICP"])
     axes.set_title(title, pad=16)
-    figure.legend(loc="outside upper left", fontsize=8.5)
+    figure.legend(loc="outside upper left")
     return figure
 
 
@@ -70,5 +70,5 @@ def _write_median(axes: Axes, x: float, values: ArrayLike) -> None:
         lowest = max(float(finite.min()), axes.get_ylim()[0])
         axes.annotate(
             f"{quantile(values, 0.5):.2g}", (x, lowest), xytext=(0, -3), ha="center", va="top",
-            textcoords="offset points", fontsize=8.5, weight="bold",
+            textcoords="offset points", fontsize=SMALL_PT, weight="bold",
         )  # fmt: skip

@@ -7,6 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike, NDArray
 
+from evaluation.figures.style import SMALL_PT
 from evaluation.statistics.intervals import quantile, with_failures
 
 
@@ -64,7 +65,7 @@ def draw_box(axes: Axes, x: float, values: ArrayLike, width: float, colour: str)
             textcoords="offset points",
             ha="center",
             va="bottom",
-            fontsize=7.5,
+            fontsize=SMALL_PT,
             color=colour,
         )
 

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from evaluation.figures.style import INK, PAPER, styled
+from evaluation.figures.style import INK, PAPER, WIDE_IN, styled
 
 COLUMNS = 3
 
@@ -48,7 +48,7 @@ def paired_differences_figure(panels: Sequence[Panel], colours: Sequence[str]) -
         colours: One a run, in the order of every panel's.
     """
     rows = -(-len(panels) // COLUMNS)
-    figure = Figure(figsize=(9.0, 2.1 * rows), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, 1.7 * rows), layout="constrained")
     grid = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
     for axes, panel in zip(grid, panels, strict=False):
         _draw(axes, panel, colours)
@@ -80,10 +80,10 @@ def _draw(axes: Axes, panel: Panel, colours: Sequence[str]) -> None:
         ):
             if count:
                 axes.text(column, y, f"{count}✕", transform=axes.get_xaxis_transform(),
-                          ha="center", va=align, color=colour, fontsize=9)  # fmt: skip
+                          ha="center", va=align, color=colour, fontsize=7.5)  # fmt: skip
     axes.set_xlim(-0.6, len(panel.runs) - 0.4)
     axes.set_xticks([])
-    axes.set_title(panel.title, fontsize=9.5)
+    axes.set_title(panel.title, fontsize=8)
 
 
 def _limits(runs: Sequence[Differences]) -> tuple[float, float]:

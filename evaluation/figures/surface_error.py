@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from evaluation.figures.boxes import draw_box, log_axis
-from evaluation.figures.style import SERIES, styled
+from evaluation.figures.style import SERIES, WIDE_IN, styled
 
 Values = dict[str, NDArray[np.float64]]
 """Label of a condition -> (surfaces,) values, NaN where a surface has none."""
@@ -21,7 +21,7 @@ def surface_figure(
     median_m: Values, p90_m: Values, completeness: Values, colours: Sequence[str] = SERIES
 ) -> Figure:
     """Boxes over the surfaces of each one's median, 90th percentile, and share of pixels."""
-    figure = Figure(figsize=(9.0, 3.4), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, 2.7), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
     for axes, groups, title in (
         (left, median_m, "median error [mm]"),
@@ -36,7 +36,7 @@ def surface_figure(
     _boxes(right, percent, "pixels with depth [%]", colours)
     for label, colour in zip(median_m, colours, strict=False):
         left.plot([], [], color=colour, linewidth=6, alpha=0.6, label=label)
-    figure.legend(loc="outside upper left", fontsize=9)
+    figure.legend(loc="outside upper left")
     return figure
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from evaluation.figures.style import INK, styled
+from evaluation.figures.style import INK, WIDE_IN, styled
 
 
 @styled
@@ -20,7 +20,7 @@ def time_ratio_figure(
         ratios: Title of a stage -> its ratio in each run, None where one was not measured.
         labels, colours: One a run.
     """
-    figure = Figure(figsize=(9.0, 0.34 * len(ratios) + 1.2), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, 0.27 * len(ratios) + 0.95), layout="constrained")
     axes = figure.subplots()
     axes.axvline(1.0, color=INK, linewidth=1.0)
     for column, (label, colour) in enumerate(zip(labels, colours, strict=True)):
