@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,6 +14,9 @@ from numpy.typing import ArrayLike
 from evaluation.figures.boxes import draw_box, log_axis, positions
 from evaluation.figures.style import COLUMN_IN, PAPER, SERIES, SMALL_PT, styled
 from evaluation.statistics.intervals import quantile, with_failures
+
+LABEL_LETTERS = 44
+"""A line of the legend holds so many."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,9 @@ def before_after_figure(
         for x, values in ((0, pair.before), (1, pair.after)):
             draw_box(axes, x + offset, values, width, colours[group])
             _write_median(axes, x + offset, values)
-        axes.plot([], [], color=colours[group], linewidth=6, alpha=0.6, label=label)
+        axes.plot(
+            [], [], color=colours[group], linewidth=6, alpha=0.6, label=fill(label, LABEL_LETTERS)
+        )
     axes.plot([0.55, 1.45], [paper, paper], color=PAPER, linewidth=1.6, linestyle=(0, (5, 3)))
     axes.text(1.52, paper, f"paper\n{paper:g} {unit}", color=PAPER, ha="left", va="center")
     axes.set_xlim(-0.5, 1.5)

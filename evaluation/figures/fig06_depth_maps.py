@@ -28,7 +28,7 @@ SHOWN = 3
 def depth_maps_figure(showcase: Showcase) -> Figure:
     """Depth above; below it the signed error, and on the left how its size is distributed."""
     columns = min(SHOWN, len(showcase.depth_maps)) + 2
-    figure = Figure(figsize=(WIDE_IN, 1.7 * WIDE_IN / columns + 0.3), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, 1.7 * WIDE_IN / columns + 0.4), layout="constrained")
     axes = figure.subplots(2, columns)
     depths = [made.depth for made in showcase.depth_maps[: columns - 2]] + [showcase.surface.depth]
     errors = [*showcase.depth_errors[: columns - 2], showcase.surface_error]
@@ -67,7 +67,7 @@ def _error_title(error: NDArray) -> str:
     if len(size) == 0:
         return "nothing seen"
     median, p90 = np.percentile(size, [50, 90])
-    return f"median {median:.1f} mm, 90 % {p90:.0f}\n{completeness(error):.0%} of pixels"
+    return f"median {median:.1f} mm\n90 %: {p90:.0f} mm\n{completeness(error):.0%} of pixels"
 
 
 def _robust_limit_mm(error: NDArray) -> float:

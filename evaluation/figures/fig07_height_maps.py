@@ -16,7 +16,7 @@ from evaluation.showcase.showcase import Showcase
 @styled
 def height_maps_figure(showcase: Showcase) -> Figure:
     """Aerial map, ground map with the aerial footprint at the best u, cost map."""
-    figure = Figure(figsize=(WIDE_IN, 3.1), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, 3.3), layout="compressed")
     aerial_axes, ground_axes, cost_axes = figure.subplots(1, 3)
     aerial, ground = showcase.aerial_heights, showcase.ground_heights
     step = showcase.steps[0]

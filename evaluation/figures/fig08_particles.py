@@ -44,7 +44,7 @@ def _draw_step(axes: Axes, step: LocalizationStep, legend: bool) -> None:
         *belief.particles[:, :2].T,
         ".",
         color=PARTICLES,
-        markersize=2.8,
+        markersize=3.6,
         markeredgewidth=0,
         alpha=0.85,
         label=f"{len(belief.particles)} particles" if legend else None,

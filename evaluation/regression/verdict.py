@@ -1,10 +1,10 @@
 """The verdict on each watched metric: better, worse, moved a little, or no difference seen.
 
-Both sides must be of one suite. The same flights on both sides are
-paired, and so are their trials one by one; entirely different flights are two samples.
-Better or worse needs two things: the change is consistent beyond chance, after Holm's
-correction for all metrics together, and it is at least as large as matters. What is beyond
-chance but smaller has moved; it is shown, and fails nothing.
+Both sides must be of one suite. The same flights on both sides are paired, and so are their
+trials one by one; entirely different flights are two samples. Better or worse needs two
+things: the change is consistent beyond chance, after Holm's correction for all metrics
+together, and it is at least as large as matters. What is beyond chance but smaller has moved;
+it is shown, and fails nothing.
 """
 
 from __future__ import annotations
