@@ -24,6 +24,7 @@ from airground.io.tum import write_tum
 from airground.pipeline import Pipeline, sight
 from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
 from airground.tracking import FrontEnds, Trackers
+from airground.warm_up import warm_up
 from evaluation.protocol.setups import Setup
 from evaluation.runs.alone import error_against, of_pose_frame
 from evaluation.runs.onlooker import Audience, Onlooker
@@ -85,6 +86,8 @@ def run_pair(pair: Pair, setup: Setup, seed: int, onlookers: Sequence[Onlooker] 
     )
     setup.given.enter(pipeline)
     audience, sighting = Audience(onlookers), None
+    if audience:  # who is shown times, without those of compiling
+        warm_up(setup.config, np.random.default_rng(0))
     surfaces = converged = 0
     alignments = []
     frames = audience.noted(trackers.frames(pair.messages()))

@@ -122,7 +122,7 @@ def test_both_plain_folders_run(tum: Path, euroc: Path, tmp_path: Path) -> None:
 
 
 def test_without_truth_all_else_is_drawn_and_nothing_changes(
-    tum: Path, euroc: Path, tmp_path: Path
+    tum: Path, euroc: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ("run", "--mav", euroc, "--ground", tum, "--heading", "search")
     drawn, plain = tmp_path / "drawn", tmp_path / "plain"
@@ -132,6 +132,8 @@ def test_without_truth_all_else_is_drawn_and_nothing_changes(
         assert file_digest(drawn / name) == file_digest(plain / name)
     assert not (plain / "run.rrd").exists()
     assert airground("view", drawn, "--save", tmp_path / "saved.rrd") == console.EXIT_OK
+    assert airground("gallery", drawn, "--out", tmp_path / "pictures") == console.EXIT_ERROR
+    assert "held against a truth" in capsys.readouterr().err
     read = ReadBack(tmp_path / "saved.rrd")
     assert read.entities >= {
         *("/ground/camera", "/ground/camera/image", "/ground/path", "/ground/map"),
