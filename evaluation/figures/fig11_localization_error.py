@@ -31,6 +31,7 @@ def localization_error_figure(
         [["boxes", "boxes"], ["near", "close"]], height_ratios=[1.5, 1]
     ).values()
     log_axis(boxes, list(errors.values()), floor=1e-3)
+    boxes.set_ylim(top=max(boxes.get_ylim()[1], 0.65))
     for limit in (0.5, 0.25):
         boxes.axhline(limit, color=PAPER, linewidth=1.0, linestyle=(0, (5, 3)))
         boxes.text(

@@ -152,3 +152,11 @@ def font_sizes_pt(pdf: bytes) -> set[float]:
             continue
         sizes |= {float(size) for size in re.findall(rb"/F\d+ ([\d.]+) Tf", unpacked)}
     return sizes
+
+
+def test_errors_below_the_limits_keep_the_limits_on_the_axis() -> None:
+    errors = np.full((3, 24), 0.02)
+    figure = localization_error_figure({"one": errors})
+    boxes, near, _ = figure.axes
+    assert boxes.get_ylim()[1] > 0.5
+    assert len(near.get_xticks()) <= 14
