@@ -47,7 +47,7 @@ def bench_figure(report: BenchReport) -> Figure:
         textcoords="offset points", ha="right", fontsize=7.5, color=HERE,
     )  # fmt: skip
     axes.grid(axis="x")
-    axes.set_title(_conditions(report), fontsize=7.5, fontweight="normal", color=FAINT)
+    axes.set_title(_conditions(report), fontsize=SMALL_PT, fontweight="normal", color=FAINT)
     _legend(figure, axes, report)
     return figure
 
