@@ -67,10 +67,10 @@ def _curve(
 def _finish(axes: Axes, quantity: Quantity, dial: str, places: dict[str, float]) -> None:
     if quantity.unit == "%":
         axes.set_ylim(0, 103)
-        axes.set_title(f"% {quantity.title}")
+        axes.set_title(f"% {quantity.title}", fontsize=SMALL_PT)
     else:
         axes.set_ylim(bottom=0)
-        axes.set_title(f"{quantity.title} [{quantity.unit}]")
+        axes.set_title(f"{quantity.title} [{quantity.unit}]", fontsize=SMALL_PT)
     words = [text.strip("'") for text in places]
     axes.set_xticks(list(places.values()), words, rotation=0 if len(words) < 7 else 45)
     unit = unit_of(dial)
