@@ -46,16 +46,19 @@ def _differences(helds: Sequence[Against]) -> Iterator[ReportFigure]:
     ]
     if not panels:
         return
-    order = ", ".join(held.run.name for held, _ in paired)
     yield ReportFigure(
         "paired_differences",
         "Paired differences from the reference",
-        f"In every panel from the left: {order}, minus {helds[0].reference.name}. A dot is a "
-        "flight (the median of its differences, for shares their mean), or a single value where "
-        "there are too few flights; the bar is the effect with its 95 % interval. On the shaded "
-        "side a run is worse. Crosses count what failed anew (above) and what no longer fails "
-        "(below). Metrics without any difference are left out.",
-        paired_differences_figure(panels, [colour for _, colour in paired]),
+        f"Each run minus {helds[0].reference.name}. A dot is a flight (the median of its "
+        "differences, for shares their mean), or a single value where there are too few flights; "
+        "the bar is the effect with its 95 % interval. On the shaded side a run is worse. Crosses "
+        "count what failed anew (above) and what no longer fails (below). Metrics without any "
+        "difference are left out.",
+        paired_differences_figure(
+            panels,
+            [_plain(held.run.name) for held, _ in paired],
+            [colour for _, colour in paired],
+        ),
     )
 
 

@@ -40,20 +40,25 @@ class Panel:
 
 
 @styled
-def paired_differences_figure(panels: Sequence[Panel], colours: Sequence[str]) -> Figure:
+def paired_differences_figure(
+    panels: Sequence[Panel], labels: Sequence[str], colours: Sequence[str]
+) -> Figure:
     """One panel a metric, one column of dots a run; shaded is the side that is worse.
 
     Args:
         panels: At least one.
-        colours: One a run, in the order of every panel's.
+        labels, colours: One a run, in the order of every panel's.
     """
     rows = -(-len(panels) // COLUMNS)
-    figure = Figure(figsize=(WIDE_IN, 1.7 * rows), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, 1.7 * rows + 0.25), layout="constrained")
     grid = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
     for axes, panel in zip(grid, panels, strict=False):
         _draw(axes, panel, colours)
     for axes in grid[len(panels) :]:
         axes.set_axis_off()
+    for label, colour in zip(labels, colours, strict=True):
+        grid[0].plot([], [], "o", color=colour, markersize=4.5, label=label)
+    figure.legend(loc="outside upper left", ncols=len(labels))
     return figure
 
 
