@@ -25,6 +25,7 @@ VERBS = {
     "simulate": "Record what the robots' sensors see in a scene, or in many.",
     "run": "Run the pipeline over a recording and measure it against the truth.",
     "evaluate": "Put the results of one or more runs into one report.",
+    "compare": "Draw two to four runs on one page: what changed, and by how much.",
     "reproduce": "Do all of it: the paper's protocol, from scenes to report.",
     "sweep": "Turn dials, and measure what that does: curves with intervals.",
     "check": "Hold results against accepted ones: better, worse, or no difference seen.",

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
 from evaluation.bench.report import BenchReport, CurveResult, RowResult
-from evaluation.figures.style import FAINT, INK, PAPER, SERIES, styled
+from evaluation.figures.style import FAINT, INK, PAPER, SERIES, SMALL_PT, WIDE_IN, styled
 
 HERE, PEER = SERIES[0], SERIES[1]
 BAR = 0.56
@@ -28,7 +28,7 @@ def bench_figure(report: BenchReport) -> Figure:
     The paper's value is a diamond, hollow where the paper used a GPU; peers are triangles.
     """
     rows = report.rows
-    figure = Figure(figsize=(9.6, 0.40 * len(rows) + 1.9), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, 0.30 * len(rows) + 1.45), layout="constrained")
     axes = figure.subplots()
     low, high = _limits(rows)
     for place, row in enumerate(rows):
@@ -43,11 +43,11 @@ def bench_figure(report: BenchReport) -> Figure:
     axes.set_ylim(len(rows) - 0.4, -0.6)
     axes.set_xlabel("time of one call [ms]")
     axes.annotate(
-        "median", (1, -0.6), (34, 6), xycoords=axes.get_yaxis_transform(),
-        textcoords="offset points", ha="right", fontsize=9, color=HERE,
+        "median", (1, -0.6), (27, 5), xycoords=axes.get_yaxis_transform(),
+        textcoords="offset points", ha="right", fontsize=7.5, color=HERE,
     )  # fmt: skip
     axes.grid(axis="x")
-    axes.set_title(_conditions(report), fontsize=9, fontweight="normal", color=FAINT)
+    axes.set_title(_conditions(report), fontsize=SMALL_PT, fontweight="normal", color=FAINT)
     _legend(figure, axes, report)
     return figure
 
@@ -82,7 +82,7 @@ def _draw_row(axes: Axes, place: int, row: RowResult, low: float) -> None:
             markerfacecolor="white" if row.published_on == "GPU" else PAPER, markeredgewidth=1.6,
         )  # fmt: skip
     axes.annotate(
-        _number(timing.median_ms), (1, place), (34, 0), xycoords=axes.get_yaxis_transform(),
+        _number(timing.median_ms), (1, place), (27, 0), xycoords=axes.get_yaxis_transform(),
         textcoords="offset points", ha="right", va="center", color=HERE, fontweight="bold",
     )  # fmt: skip
 
@@ -95,7 +95,7 @@ def _headings(axes: Axes, rows: list[RowResult]) -> None:
                 axes.axhline(place - 0.5, color="#D9DCE0", linewidth=0.8)
             axes.annotate(
                 row.group, (1, place - 0.46), (-4, 0), xycoords=axes.get_yaxis_transform(),
-                textcoords="offset points", ha="right", va="top", fontsize=8, color=FAINT,
+                textcoords="offset points", ha="right", va="top", fontsize=SMALL_PT, color=FAINT,
             )  # fmt: skip
 
 
@@ -130,13 +130,13 @@ def curves_figure(report: BenchReport) -> Figure:
     """
     curves = report.curves
     height = math.ceil(len(curves) / COLUMNS)
-    figure = Figure(figsize=(2.75 * COLUMNS, 2.75 * height), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, WIDE_IN / COLUMNS * height), layout="constrained")
     grid = figure.subplots(height, COLUMNS, squeeze=False)
     for axes, curve in zip(grid.flat, curves, strict=False):
         _draw_curve(axes, curve)
     for axes in grid.flat[len(curves) :]:
         axes.set_visible(False)
-    figure.supylabel("median [ms]: by the clock (blue), processor time (grey)", fontsize=10)
+    figure.supylabel("median [ms]: by the clock (blue), processor time (grey)", fontsize=8)
     return figure
 
 

@@ -31,8 +31,13 @@ class Gallery(Verb, OutWord):
         from evaluation.figures.style import save_picture
         from evaluation.output import fresh_folder
         from evaluation.report.figures import report_figures
-        from evaluation.results.folder import read_results
+        from evaluation.results.folder import TABLE, read_results
 
+        if self.run.is_dir() and not (self.run / TABLE).exists():
+            raise InputError(
+                f"{self.run}: has no {TABLE}, so nothing in it was held against a truth; "
+                "airground view shows what run --rerun has kept"
+            )
         results = read_results(self.run)
         if results.showcase is None:
             raise InputError(f"{self.run}: keeps no pictures; run the recording again with --rerun")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Literal
 from airground.errors import InputError
 
 if TYPE_CHECKING:
-    from airground.io.recording import Recording
+    from airground.core.cloud import Source
+    from airground.core.messages import RobotCalibration
     from evaluation.runs.onlooker import Onlooker
     from sim.truth import Truth
 
@@ -27,14 +28,12 @@ class LookWords:
     rerun_level: Literal["summary", "stages", "all"] = "stages"
     """How much run.rrd keeps of each second: docs/look_into_a_run.md has the sizes."""
 
-    def check_look_words(self, alone: bool, realtime: bool, own: bool) -> None:
+    def check_look_words(self, alone: bool, realtime: bool) -> None:
         """Raises InputError where a word has no meaning."""
         if self.rerun_level != "stages" and not self.looks:
             raise InputError("--rerun-level: only with --rerun or --rerun-live")
         if self.looks and alone:
             raise InputError("--rerun: shows both robots; leave --only out")
-        if self.looks and own:
-            raise InputError("--rerun: needs a recording that simulate has written")
         if self.looks and realtime:
             raise InputError(
                 "--rerun: drawing would slow a live run down; run it again without --realtime, "
@@ -48,7 +47,11 @@ class LookWords:
 
     @contextmanager
     def watching(
-        self, folder: Path, recording: Recording, truth: Truth
+        self,
+        folder: Path,
+        name: str,
+        calibrations: Mapping[Source, RobotCalibration],
+        truth: Truth | None,
     ) -> Iterator[list[Onlooker]]:
         """Who draws the run into a folder, while the block runs; nobody where not asked for."""
         if not self.looks:
@@ -58,7 +61,7 @@ class LookWords:
 
         with ExitStack() as stack:
             viewer = stack.enter_context(_viewer()) if self.rerun_live else None
-            view = RunView(folder / RUN_FILE, recording, truth, self.rerun_level, viewer)
+            view = RunView(folder / RUN_FILE, name, calibrations, truth, self.rerun_level, viewer)
             stack.callback(view.close)
             yield [view]
 

@@ -11,8 +11,21 @@ from tyro.conf import arg
 from airground.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from contextlib import AbstractContextManager
+
+    from airground.core.cloud import Source
+    from airground.core.messages import RobotCalibration
     from evaluation.protocol.setups import Setup
     from evaluation.runs.given import Given
+    from evaluation.runs.onlooker import Onlooker
+    from sim.truth import Truth
+
+    Watching = Callable[
+        [Path, str, Mapping[Source, RobotCalibration], Truth | None],
+        AbstractContextManager[Sequence[Onlooker]],
+    ]
+    """Who watches a run: of a folder to draw into, a name, both robots' lenses, what is true."""
 
 _OPTIONAL = "(optional)"
 
@@ -70,7 +83,7 @@ class OwnWords:
         given = (self.mav_trajectory, self.ground_trajectory, self.ground_map)
         return any(path is not None for path in given)
 
-    def run_own(self, out: Path, setup: Setup, seed: int) -> None:
+    def run_own(self, out: Path, setup: Setup, seed: int, watching: Watching) -> None:
         """Run both folders, write what came out, and print a summary."""
         from airground.core.cloud import Source
         from airground.io.open_robot import open_robot
@@ -88,7 +101,11 @@ class OwnWords:
                 open_robot(self.mav, Source.MAV, self.mav_calibration),
                 open_robot(self.ground, Source.GROUND, self.ground_calibration),
             )
-            summary = write_pair(folder, pair, setup, run_pair(pair, setup, seed))
+            name = f"{self.mav.name}, {self.ground.name}"
+            calibrations = {robot: pair.of(robot).calibration for robot in Source}
+            with watching(folder, name, calibrations, None) as onlookers:
+                result = run_pair(pair, setup, seed, onlookers)
+            summary = write_pair(folder, pair, setup, result)
             write_config(setup.config, folder / "config.toml")
         print_pair(summary)
 

@@ -49,15 +49,17 @@ class Run(Verb, OwnWords, AloneWords, RealtimeWords, LookWords, SetupWords, Seed
         self.check_realtime_words(self.only)
         live = self.realtime or self.drops is not None
         self.check_own_words(self.recording, self.only is not None, live)
-        self.check_look_words(self.only is not None, self.realtime, self.recording is None)
+        self.check_look_words(self.only is not None, self.realtime)
         if self.recording is None:
-            self.run_own(self.out, self.with_given(self.setup()), self.checked_seed())
+            setup, seed = self.with_given(self.setup()), self.checked_seed()
+            self.run_own(self.out, setup, seed, self.watching)
         elif self.only is not None:
             self.run_one(self.recording, self.out, self.resolved_config(), self.checked_seed())
         else:
             self._run_both(self.recording)
 
     def _run_both(self, path: Path) -> None:
+        from airground.core.cloud import Source
         from airground.io.layout import HEADER
         from airground.io.recording import Recording
         from evaluation.output import fresh_folder
@@ -78,7 +80,8 @@ class Run(Verb, OwnWords, AloneWords, RealtimeWords, LookWords, SetupWords, Seed
             recording = Recording.open(path)
             truth = Truth.open(recording.path)
             closeup = CloseUp(recording, truth, setup) if self.looks else None
-            with self.watching(folder, recording, truth) as onlookers:
+            calibrations = {robot: recording.calibration(robot) for robot in Source}
+            with self.watching(folder, recording.path.name, calibrations, truth) as onlookers:
                 if closeup is not None:
                     onlookers.append(closeup)
                 result, drops = self._result(recording, truth, setup, seed, onlookers)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,8 +12,11 @@ from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
 from evaluation.figures.boxes import draw_box, log_axis, positions
-from evaluation.figures.style import PAPER, SERIES, styled
+from evaluation.figures.style import COLUMN_IN, PAPER, SERIES, SMALL_PT, styled
 from evaluation.statistics.intervals import quantile, with_failures
+
+LABEL_LETTERS = 44
+"""A line of the legend holds so many."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,7 @@ def before_after_figure(
         floor: Smallest value on the axis.
         colours: One a condition.
     """
-    figure = Figure(figsize=(4.6, 4.9), layout="constrained")
+    figure = Figure(figsize=(COLUMN_IN, 3.8), layout="constrained")
     axes = figure.subplots()
     log_axis(axes, [e for pair in trials.values() for e in (pair.before, pair.after)], floor)
     low, high = axes.get_ylim()
@@ -52,13 +56,15 @@ def before_after_figure(
         for x, values in ((0, pair.before), (1, pair.after)):
             draw_box(axes, x + offset, values, width, colours[group])
             _write_median(axes, x + offset, values)
-        axes.plot([], [], color=colours[group], linewidth=6, alpha=0.6, label=label)
+        axes.plot(
+            [], [], color=colours[group], linewidth=6, alpha=0.6, label=fill(label, LABEL_LETTERS)
+        )
     axes.plot([0.55, 1.45], [paper, paper], color=PAPER, linewidth=1.6, linestyle=(0, (5, 3)))
     axes.text(1.52, paper, f"paper\n{paper:g} {unit}", color=PAPER, ha="left", va="center")
     axes.set_xlim(-0.5, 1.5)
     axes.set_xticks([0, 1], ["before ICP", "after ICP"])
     axes.set_title(title, pad=16)
-    figure.legend(loc="outside upper left", fontsize=8.5)
+    figure.legend(loc="outside upper left")
     return figure
 
 
@@ -70,5 +76,5 @@ def _write_median(axes: Axes, x: float, values: ArrayLike) -> None:
         lowest = max(float(finite.min()), axes.get_ylim()[0])
         axes.annotate(
             f"{quantile(values, 0.5):.2g}", (x, lowest), xytext=(0, -3), ha="center", va="top",
-            textcoords="offset points", fontsize=8.5, weight="bold",
+            textcoords="offset points", fontsize=SMALL_PT, weight="bold",
         )  # fmt: skip

@@ -7,7 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike, NDArray
 
+from evaluation.figures.style import SMALL_PT
 from evaluation.statistics.intervals import quantile, with_failures
+
+MOST_TICKS = 14
 
 
 def draw_box(axes: Axes, x: float, values: ArrayLike, width: float, colour: str) -> None:
@@ -64,7 +67,7 @@ def draw_box(axes: Axes, x: float, values: ArrayLike, width: float, colour: str)
             textcoords="offset points",
             ha="center",
             va="bottom",
-            fontsize=7.5,
+            fontsize=SMALL_PT,
             color=colour,
         )
 
@@ -93,5 +96,5 @@ def iteration_axis(axes: Axes, groups: list[NDArray[np.float64]]) -> None:
     """A horizontal axis of iterations for arrays of (sequences, iterations)."""
     last = max((group.shape[1] for group in groups), default=1)
     axes.set_xlim(0.4, last + 0.6)
-    axes.set_xticks(range(1, last + 1))
+    axes.set_xticks(range(1, last + 1, -(-last // MOST_TICKS)))
     axes.set_xlabel("iteration (aerial maps taken in)")

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from evaluation.figures.style import FAINT, INK, SERIES, styled
+from evaluation.figures.style import FAINT, INK, SERIES, SMALL_PT, WIDE_IN, styled
 from evaluation.trust.calibration import ELLIPSES, Localizations
 
 NOMINAL = np.linspace(0.01, 0.99, 99)
@@ -19,7 +20,7 @@ def calibration_figure(found: Localizations) -> Figure:
     Args:
         found: At least one localization.
     """
-    figure = Figure(figsize=(9.0, 4.4), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, 3.5), layout="constrained")
     left, right = figure.subplots(1, 2)
     _coverage(left, found)
     _spread_against_error(right, found)
@@ -28,7 +29,7 @@ def calibration_figure(found: Localizations) -> Figure:
 
 def _coverage(axes: Axes, found: Localizations) -> None:
     axes.plot([0, 100], [0, 100], color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
-    axes.text(32, 35, "as it should be", rotation=45, rotation_mode="anchor", fontsize=8.5)
+    axes.text(32, 35, "as it should be", rotation=45, rotation_mode="anchor", fontsize=SMALL_PT)
     groups = (("all", found, FAINT), ("accepted", found.only_accepted(), SERIES[0]))
     for shift, (name, part, colour) in enumerate(groups):
         if len(part) == 0:
@@ -68,6 +69,9 @@ def _spread_against_error(axes: Axes, found: Localizations) -> None:
         )
     axes.set_xscale("log")
     axes.set_yscale("log")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_minor_formatter(NullFormatter())
     low, high = _limits(found)
     axes.plot([low, high], [low, high], color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
     axes.set_xlim(low, high)

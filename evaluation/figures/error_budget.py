@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from evaluation.figures.style import SERIES, styled
+from evaluation.figures.style import SERIES, WIDE_IN, styled
 from evaluation.statistics.intervals import quantile
 
 
@@ -21,7 +21,7 @@ def error_budget_figure(
         errors: What is true -> (N,) errors of position [m] and (N,) of angle [deg], NaN where
             the pose was not found.
     """
-    figure = Figure(figsize=(9.0, 0.36 * len(errors) + 1.5), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, 0.28 * len(errors) + 1.2), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     _bars(left, [1e3 * metres for metres, _ in errors.values()], "position error [mm]")
     _bars(right, [degrees for _, degrees in errors.values()], "angle error [deg]")
@@ -35,7 +35,7 @@ def _bars(axes: Axes, groups: list[NDArray[np.float64]], label: str) -> None:
     medians = [quantile(group, 0.5) for group in groups]
     for row, (group, median) in enumerate(zip(groups, medians, strict=True)):
         if not np.isfinite(median):
-            axes.text(0.0, row, " most fail", color=SERIES[0], va="center", fontsize=9)
+            axes.text(0.0, row, " most fail", color=SERIES[0], va="center", fontsize=7.5)
             continue
         low, high = quantile(group, 0.25), quantile(group, 0.75)
         axes.barh(row, median, height=0.55, color=SERIES[0], alpha=0.75 if row else 1.0)

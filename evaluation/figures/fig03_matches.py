@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from evaluation.baselines.matched_images import MatchedImages
-from evaluation.figures.style import SERIES, picture_axes, styled
+from evaluation.figures.style import SERIES, WIDE_IN, picture_axes, styled
 from evaluation.protocol.trials import spread_evenly
 
 GAP_PX = 16
@@ -21,21 +21,20 @@ AGREEING, OTHERS = SERIES[2], "#D62246"
 def matches_figure(matched: MatchedImages) -> Figure:
     """Both images side by side; green lines agree with one pose, thin red ones do not."""
     picture, shift = _side_by_side(matched.aerial, matched.ground)
-    width = 12.0
-    height = width * picture.shape[0] / picture.shape[1] + 0.45
-    figure = Figure(figsize=(width, height), layout="constrained")
+    height = WIDE_IN * picture.shape[0] / picture.shape[1] + 0.35
+    figure = Figure(figsize=(WIDE_IN, height), layout="constrained")
     axes = figure.subplots()
     axes.imshow(picture, cmap="gray", vmin=0, vmax=255)
     lines = np.stack([matched.aerial_px, matched.ground_px + shift], axis=1)
     for kept, colour, thickness, opacity in (
-        (~matched.agrees, OTHERS, 0.5, 0.4),
-        (matched.agrees, AGREEING, 0.7, 0.8),
+        (~matched.agrees, OTHERS, 0.35, 0.4),
+        (matched.agrees, AGREEING, 0.5, 0.8),
     ):
         drawn = lines[_some(np.flatnonzero(kept))]
         axes.add_collection(
             LineCollection(list(drawn), colors=colour, linewidths=thickness, alpha=opacity)
         )
-        axes.plot(*drawn.reshape(-1, 2).T, ".", color=colour, alpha=opacity, markersize=2.5)
+        axes.plot(*drawn.reshape(-1, 2).T, ".", color=colour, alpha=opacity, markersize=1.6)
     axes.set_xlim(-0.5, picture.shape[1] - 0.5)
     axes.set_ylim(picture.shape[0] - 0.5, -0.5)
     axes.set_title(

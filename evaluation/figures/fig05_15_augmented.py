@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from evaluation.figures.style import picture_axes, styled
+from evaluation.figures.style import WIDE_IN, picture_axes, styled
 from evaluation.showcase.scene_pictures import GROUND_COLOUR, GROUND_PATH, MAV_COLOUR, MAV_PATH
 
 
@@ -15,7 +15,7 @@ from evaluation.showcase.scene_pictures import GROUND_COLOUR, GROUND_PATH, MAV_C
 def augmented_figure(robot_view: NDArray[np.uint8], aerial_view: NDArray[np.uint8]) -> Figure:
     """Two rendered pictures, (height, width, 3) each, with a legend."""
     height, width = robot_view.shape[:2]
-    figure = Figure(figsize=(12.0, 6.0 * height / width + 0.75), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, WIDE_IN / 2 * height / width + 0.6), layout="constrained")
     titles = ("a  from the ground robot's side", "b  from the aerial side")
     for axes, picture, title in zip(
         figure.subplots(1, 2), (robot_view, aerial_view), titles, strict=True

@@ -12,6 +12,8 @@ from evaluation.figures.style import (
     ERROR_COLOURS,
     FAINT,
     SERIES,
+    SMALL_PT,
+    WIDE_IN,
     colour_map,
     picture_axes,
     styled,
@@ -26,7 +28,7 @@ SHOWN = 3
 def depth_maps_figure(showcase: Showcase) -> Figure:
     """Depth above; below it the signed error, and on the left how its size is distributed."""
     columns = min(SHOWN, len(showcase.depth_maps)) + 2
-    figure = Figure(figsize=(2.35 * columns, 4.15), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, 1.7 * WIDE_IN / columns + 0.4), layout="constrained")
     axes = figure.subplots(2, columns)
     depths = [made.depth for made in showcase.depth_maps[: columns - 2]] + [showcase.surface.depth]
     errors = [*showcase.depth_errors[: columns - 2], showcase.surface_error]
@@ -45,7 +47,7 @@ def depth_maps_figure(showcase: Showcase) -> Figure:
         wrong = axes[1, column].imshow(
             1e3 * error, cmap=colour_map(ERROR_COLOURS, hole=FAINT), vmin=-limit_mm, vmax=limit_mm
         )
-        axes[1, column].set_title(_error_title(error), fontsize=9, fontweight="normal")
+        axes[1, column].set_title(_error_title(error), fontsize=SMALL_PT, fontweight="normal")
         picture_axes(axes[0, column])
         picture_axes(axes[1, column])
     figure.colorbar(shown, ax=axes[0, :], label="depth [m]", shrink=0.85, pad=0.01)
@@ -65,7 +67,7 @@ def _error_title(error: NDArray) -> str:
     if len(size) == 0:
         return "nothing seen"
     median, p90 = np.percentile(size, [50, 90])
-    return f"median {median:.1f}, 90 % {p90:.0f} mm\n{completeness(error):.0%} of pixels"
+    return f"median {median:.1f} mm\n90 %: {p90:.0f} mm\n{completeness(error):.0%} of pixels"
 
 
 def _robust_limit_mm(error: NDArray) -> float:
@@ -87,8 +89,8 @@ def _distribution(axes: Axes, errors: list[NDArray]) -> None:
     axes.set_xscale("log")
     axes.set_xticks([1, 10, 100], ["1", "10", "100"])
     axes.set_ylim(0, 100)
-    axes.set_xlabel("error up to [mm]", fontsize=9)
-    axes.set_title("% of pixels within", fontsize=9, fontweight="normal")
+    axes.set_xlabel("error up to [mm]", fontsize=7.5)
+    axes.set_title("% of pixels within", fontsize=7.5, fontweight="normal")
     axes.grid()
 
 

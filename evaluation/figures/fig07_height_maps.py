@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_closing, binary_fill_holes
 
 from evaluation.figures.maps import draw_costs, draw_grid, mark_truth
-from evaluation.figures.style import HEIGHT_COLOURS, PAPER, styled
+from evaluation.figures.style import HEIGHT_COLOURS, PAPER, WIDE_IN, styled
 from evaluation.showcase.showcase import Showcase
 
 
 @styled
 def height_maps_figure(showcase: Showcase) -> Figure:
     """Aerial map, ground map with the aerial footprint at the best u, cost map."""
-    figure = Figure(figsize=(11.5, 3.7), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, 3.3), layout="compressed")
     aerial_axes, ground_axes, cost_axes = figure.subplots(1, 3)
     aerial, ground = showcase.aerial_heights, showcase.ground_heights
     step = showcase.steps[0]
@@ -38,7 +38,7 @@ def height_maps_figure(showcase: Showcase) -> Figure:
             vmin=low,
             vmax=low + span,
         )
-        figure.colorbar(shown, ax=axes, label="height [m]", shrink=0.9, extend="max")
+        figure.colorbar(shown, ax=axes, label="height [m]", location="bottom", extend="max")
         axes.set_title(title)
     best = step.cost_map.best()
     if best is not None:
@@ -49,16 +49,16 @@ def height_maps_figure(showcase: Showcase) -> Figure:
     shown = draw_costs(cost_axes, cost_map.costs, cost_map.origin, cost_map.cells_per_m)
     units = {"zmssd": "ZMSSD [m²]", "ncc": "1 - correlation"}
     label = units.get(cost_map.cost, cost_map.cost)
-    figure.colorbar(shown, ax=cost_axes, label=label, shrink=0.9, extend="max")
+    figure.colorbar(shown, ax=cost_axes, label=label, location="bottom", extend="max")
     cost_axes.set_title("c  cost of every position u")
     if best is not None:
         cost_axes.plot(
             *best,
             "o",
-            markersize=13,
+            markersize=9,
             markerfacecolor="none",
             markeredgecolor=PAPER,
-            markeredgewidth=2,
+            markeredgewidth=1.4,
             linestyle="none",
             label="lowest cost",
         )
@@ -80,4 +80,4 @@ def _footprint(axes: Axes, showcase: Showcase, u: NDArray) -> None:
     c, s = np.cos(showcase.aerial_heading), np.sin(showcase.aerial_heading)
     x = u[0] + c * points[..., 0] - s * points[..., 1]
     y = u[1] + s * points[..., 0] + c * points[..., 1]
-    axes.contour(x, y, seen.astype(float), levels=[0.5], colors=[PAPER], linewidths=1.8)
+    axes.contour(x, y, seen.astype(float), levels=[0.5], colors=[PAPER], linewidths=1.2)

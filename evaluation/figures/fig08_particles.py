@@ -10,7 +10,7 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from evaluation.figures.maps import draw_costs, mark_truth
-from evaluation.figures.style import styled
+from evaluation.figures.style import WIDE_IN, styled
 from evaluation.showcase.showcase import LocalizationStep
 
 PARTICLES = "#35C46A"
@@ -23,12 +23,12 @@ ZOOM_M = 0.3
 @styled
 def particles_figure(steps: tuple[LocalizationStep, ...]) -> Figure:
     """One panel a step: cost map, particles, their covariance (2 sigma), the truth."""
-    figure = Figure(figsize=(3.85 * len(steps), 4.2), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, WIDE_IN / len(steps) + 0.35), layout="constrained")
     panels = figure.subplots(1, len(steps), squeeze=False)[0]
     for number, (axes, step) in enumerate(zip(panels, steps, strict=True), 1):
         _draw_step(axes, step, legend=True)
         error = float(np.linalg.norm(step.belief.estimate[:2] - step.true_u))
-        axes.set_title(f"{number}  off by {error:.2f} m, spread {step.belief.spread_m:.2f} m")
+        axes.set_title(f"{number}  off {error:.2f} m, spread {step.belief.spread_m:.2f} m")
         axes.set_xlabel("x [m]")
         if step.belief.spread_m < ZOOM_BELOW_M:
             _zoom(axes, step)
@@ -44,7 +44,7 @@ def _draw_step(axes: Axes, step: LocalizationStep, legend: bool) -> None:
         *belief.particles[:, :2].T,
         ".",
         color=PARTICLES,
-        markersize=4.5,
+        markersize=3.6,
         markeredgewidth=0,
         alpha=0.85,
         label=f"{len(belief.particles)} particles" if legend else None,
@@ -76,8 +76,8 @@ def covariance_ellipse(mean: NDArray, covariance: NDArray, sigmas: float = 2.0) 
     width, height = 2 * sigmas * np.sqrt(np.maximum(variances, 1e-8))
     angle = np.degrees(np.arctan2(axes[1, 0], axes[0, 0]))
     ellipse = Ellipse(
-        tuple(mean), width, height, angle=angle, fill=False, edgecolor="white", linewidth=2.0
+        tuple(mean), width, height, angle=angle, fill=False, edgecolor="white", linewidth=1.3
     )
-    ellipse.set_path_effects([withStroke(linewidth=3.2, foreground="#555555")])
+    ellipse.set_path_effects([withStroke(linewidth=2.1, foreground="#555555")])
     ellipse.set_zorder(4)
     return ellipse

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from evaluation.figures.style import HOLE, PAPER, SERIES, styled
+from evaluation.figures.style import HOLE, PAPER, SERIES, WIDE_IN, styled
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ def trajectory_error_figure(runs: Sequence[ErrorOverTime], paper_m: float) -> Fi
         runs: To be drawn below each other, with the same scale.
         paper_m: RMS error of the paper [m].
     """
-    figure = Figure(figsize=(9.0, 0.9 + 2.3 * len(runs)), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, 0.7 + 1.85 * len(runs)), layout="constrained")
     panels = figure.subplots(len(runs), 1, squeeze=False, sharey=True)[:, 0]
     for axes, run in zip(panels, runs, strict=True):
         _shade_gaps(axes, run)
@@ -47,7 +47,7 @@ def trajectory_error_figure(runs: Sequence[ErrorOverTime], paper_m: float) -> Fi
         axes.axhline(100 * paper_m, color=PAPER, linewidth=1.0, linestyle=(0, (5, 3)))
         axes.text(
             1.005, 100 * paper_m, f"paper\n{100 * paper_m:g} cm RMS", color=PAPER,
-            transform=axes.get_yaxis_transform(), va="center", fontsize=9,
+            transform=axes.get_yaxis_transform(), va="center", fontsize=7.5,
         )  # fmt: skip
         live, final = _rms(run.live_m), _rms(run.final_m)
         axes.set_title(f"{run.title}: RMS {100 * live:.2f} cm live, {100 * final:.2f} cm final")

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from evaluation.figures.boxes import draw_box, iteration_axis, log_axis, positions
-from evaluation.figures.style import PAPER, SERIES, styled
+from evaluation.figures.style import PAPER, SERIES, WIDE_IN, styled
 from evaluation.report import published
 from evaluation.statistics.intervals import rate_within
 
@@ -26,16 +26,17 @@ def localization_error_figure(
             sequence failed.
         colours: One a condition.
     """
-    figure = Figure(figsize=(9.0, 6.6), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, 5.25), layout="constrained")
     boxes, near, close = figure.subplot_mosaic(
         [["boxes", "boxes"], ["near", "close"]], height_ratios=[1.5, 1]
     ).values()
     log_axis(boxes, list(errors.values()), floor=1e-3)
+    boxes.set_ylim(top=max(boxes.get_ylim()[1], 0.65))
     for limit in (0.5, 0.25):
         boxes.axhline(limit, color=PAPER, linewidth=1.0, linestyle=(0, (5, 3)))
         boxes.text(
             1.005, limit, f"{limit:g} m", transform=boxes.get_yaxis_transform(), color=PAPER,
-            va="center", fontsize=9,
+            va="center", fontsize=7.5,
         )  # fmt: skip
     for group, (label, error) in enumerate(errors.items()):
         offset, width = positions(len(errors), group)
@@ -44,7 +45,7 @@ def localization_error_figure(
         boxes.plot([], [], color=colours[group], linewidth=6, alpha=0.6, label=label)
     boxes.set_title("error of the MAV's position relative to the ground robot [m]", pad=16)
     iteration_axis(boxes, list(errors.values()))
-    figure.legend(loc="outside upper left", ncols=1, fontsize=9)
+    figure.legend(loc="outside upper left")
 
     _success(near, errors, colours, 0.5, published.WITHIN_0_50_M_FIRST.value, at=1)
     _success(close, errors, colours, 0.25, published.WITHIN_0_25_M_FOURTH.value, at=4)
@@ -76,7 +77,7 @@ def _success(
     axes.plot(at, 100 * paper, "D", color=PAPER, markersize=7, zorder=5, clip_on=False)
     axes.annotate(
         f"paper {paper:.0%}", (at, 100 * paper), xytext=(8, -4), textcoords="offset points",
-        color=PAPER, va="top", fontsize=9, zorder=6,
+        color=PAPER, va="top", fontsize=7.5, zorder=6,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
     )  # fmt: skip
     axes.set_ylim(0, 103)

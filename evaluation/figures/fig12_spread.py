@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from evaluation.figures.boxes import draw_box, iteration_axis, log_axis, positions
-from evaluation.figures.style import SERIES, styled
+from evaluation.figures.style import SERIES, WIDE_IN, styled
 
 
 @styled
@@ -23,7 +23,7 @@ def spread_figure(
             is no belief.
         colours: One a condition.
     """
-    figure = Figure(figsize=(9.0, 4.2), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, 3.3), layout="constrained")
     axes = figure.subplots()
     log_axis(axes, list(spreads.values()), floor=1e-3)
     for group, (label, spread) in enumerate(spreads.items()):
@@ -33,5 +33,5 @@ def spread_figure(
         axes.plot([], [], color=colours[group], linewidth=6, alpha=0.6, label=label)
     iteration_axis(axes, list(spreads.values()))
     axes.set_title("standard deviation of the particles [m]", pad=16)
-    figure.legend(loc="outside upper left", fontsize=9)
+    figure.legend(loc="outside upper left")
     return figure

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from evaluation.figures.style import SERIES, styled
+from evaluation.figures.style import SERIES, WIDE_IN, styled
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +32,7 @@ class FrontEndError:
 @styled
 def front_ends_figure(title: str, errors: Sequence[FrontEndError]) -> Figure:
     """One curve a front end, with its RMS error and how many images it tracked."""
-    figure = Figure(figsize=(8.0, 3.6), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, 3.2), layout="constrained")
     axes = figure.subplots()
     for colour, one in zip(SERIES, errors, strict=False):
         rms = float(np.sqrt(np.mean(one.error_m**2)))

@@ -45,14 +45,14 @@ def draw_costs(axes: Axes, costs: NDArray, origin: NDArray, cells_per_m: float) 
 def mark_truth(axes: Axes, u: ArrayLike, label: str | None = "true position") -> None:
     """A black cross on white: visible on any ground."""
     x, y = np.asarray(u)
-    axes.plot(x, y, "+", color="white", markersize=15, markeredgewidth=4.5, zorder=5)
+    axes.plot(x, y, "+", color="white", markersize=10, markeredgewidth=3.2, zorder=5)
     axes.plot(
         x,
         y,
         "+",
         color="black",
-        markersize=14,
-        markeredgewidth=1.8,
+        markersize=9.5,
+        markeredgewidth=1.3,
         zorder=6,
         linestyle="none",
         label=label,

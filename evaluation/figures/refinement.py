@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from airground.core.se3 import SE3
-from evaluation.figures.style import INK, styled
+from evaluation.figures.style import INK, WIDE_IN, styled
 from evaluation.showcase.scene_pictures import GROUND_COLOUR
 from evaluation.showcase.showcase import Showcase
 
@@ -30,7 +30,7 @@ def refinement_figure(showcase: Showcase, T_ground_mav: SE3) -> Figure:
     """
     aerial, ground = showcase.surface.cloud_mav.points, showcase.ground_cloud.points
     y = _liveliest_cut(ground, T_ground_mav @ aerial)
-    figure = Figure(figsize=(8.8, 4.6), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, 3.9), layout="constrained")
     panels = figure.subplots(2, 1, sharex=True, sharey=True)
     placed = (
         ("before refinement: where the particles put it", showcase.steps[0].belief.T_ground_mav),

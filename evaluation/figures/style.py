@@ -25,26 +25,31 @@ ERROR_COLOURS = "RdBu_r"
 COST_COLOURS = LinearSegmentedColormap.from_list("cost", ["#000000", "#C4C8CE"])
 """Ends in grey, so that white lines stay visible on it."""
 
+WIDE_IN, COLUMN_IN = 7.16, 3.5
+"""Widths of figures: both columns of a paper, or one of them. Nothing is scaled in print."""
+SMALL_PT = 7.0
+"""The smallest text."""
+
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
-    "font.size": 10.0,
-    "axes.titlesize": 10.5,
+    "font.size": 8.0,
+    "axes.titlesize": 8.5,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
     "axes.labelcolor": INK,
     "axes.edgecolor": "#5A5F66",
-    "axes.linewidth": 0.8,
+    "axes.linewidth": 0.7,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.axisbelow": True,
     "axes.grid": False,
     "grid.color": "#D9DCE0",
-    "grid.linewidth": 0.7,
+    "grid.linewidth": 0.6,
     "text.color": INK,
     "xtick.color": "#3A3F45",
     "ytick.color": "#3A3F45",
     "legend.frameon": False,
-    "legend.fontsize": 9.0,
+    "legend.fontsize": 7.5,
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
     "figure.dpi": 100,
@@ -55,7 +60,7 @@ STYLE: dict[str, Any] = {
 styled = mpl.rc_context(STYLE)  # type: ignore[arg-type]
 """Decorator that gives a figure function this look."""
 
-PICTURE_DPI = 160
+PICTURE_DPI = 210
 
 
 def colour_map(colours: str | Colormap, hole: str = HOLE) -> Colormap:

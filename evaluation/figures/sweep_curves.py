@@ -10,7 +10,7 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from evaluation.figures.style import SERIES, styled
+from evaluation.figures.style import SERIES, SMALL_PT, WIDE_IN, styled
 from evaluation.sweep.dials import Point, Value, unit_of
 from evaluation.sweep.readings import QUANTITIES, Quantity
 
@@ -25,7 +25,7 @@ COLUMNS = 3
 def sweep_figure(plan: SweepPlan, measured: Sequence[Measured]) -> Figure:
     """The first dial along x; a line for each combination of the others."""
     rows = -(-len(QUANTITIES) // COLUMNS)
-    figure = Figure(figsize=(10.0, 3.1 * rows), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, 2.3 * rows), layout="constrained")
     grid = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
     first, *others = (vary.name for vary in plan.varied)
     lines: dict[str, list[Measured]] = {}
@@ -41,8 +41,8 @@ def sweep_figure(plan: SweepPlan, measured: Sequence[Measured]) -> Figure:
         axes.set_axis_off()
     if others:
         handles, labels = grid[0].get_legend_handles_labels()
-        grid[-1].legend(handles, labels, loc="center left", fontsize=8)
-    figure.suptitle(_caption(plan, measured), x=0.01, ha="left", fontsize=9)
+        grid[-1].legend(handles, labels, loc="center left", fontsize=SMALL_PT)
+    figure.suptitle(_caption(plan, measured), x=0.01, ha="left", fontsize=7.5)
     return figure
 
 
@@ -67,10 +67,10 @@ def _curve(
 def _finish(axes: Axes, quantity: Quantity, dial: str, places: dict[str, float]) -> None:
     if quantity.unit == "%":
         axes.set_ylim(0, 103)
-        axes.set_title(f"% {quantity.title}")
+        axes.set_title(f"% {quantity.title}", fontsize=SMALL_PT)
     else:
         axes.set_ylim(bottom=0)
-        axes.set_title(f"{quantity.title} [{quantity.unit}]")
+        axes.set_title(f"{quantity.title} [{quantity.unit}]", fontsize=SMALL_PT)
     words = [text.strip("'") for text in places]
     axes.set_xticks(list(places.values()), words, rotation=0 if len(words) < 7 else 45)
     unit = unit_of(dial)

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
-from evaluation.figures.style import FAINT, PAPER, SERIES, styled
+from evaluation.figures.style import FAINT, PAPER, SERIES, WIDE_IN, styled
 from evaluation.report.published import TABLE_I
 
 
@@ -20,7 +20,7 @@ def timing_figure(durations_ms: dict[str, NDArray[np.float64]]) -> Figure:
             measured are left out unless the paper has a value.
     """
     stages = [s for s in TABLE_I if s.metric in durations_ms or s.published_ms is not None]
-    figure = Figure(figsize=(9.0, 0.36 * len(stages) + 1.3), layout="constrained")
+    figure = Figure(figsize=(WIDE_IN, 0.28 * len(stages) + 1.0), layout="constrained")
     axes = figure.subplots()
     for row, stage in enumerate(stages):
         measured = durations_ms.get(stage.metric)
@@ -30,7 +30,7 @@ def timing_figure(durations_ms: dict[str, NDArray[np.float64]]) -> Figure:
             axes.hlines(row, median, p95, color=SERIES[0], linewidth=1.6)
             axes.vlines(p95, row - 0.16, row + 0.16, color=SERIES[0], linewidth=1.6)
         else:
-            axes.text(0.12, row, "not run", color=FAINT, va="center", fontsize=9)
+            axes.text(0.12, row, "not run", color=FAINT, va="center", fontsize=7.5)
         if stage.published_ms is not None:
             gpu = stage.processor == "GPU"
             axes.plot(

@@ -48,6 +48,15 @@ class Measured:
         samples = {metric.name: metric.samples(part) for metric in WATCHED}
         return cls(suite_of(everyone), chosen, everyone, samples)
 
+    def only(self, kept: set[Flight]) -> Measured:
+        """Without the other flights."""
+        remaining = [flight for flight in self.flights if flight in kept]
+        samples = {
+            name: {flight: values for flight, values in by_flight.items() if flight in kept}
+            for name, by_flight in self.samples.items()
+        }
+        return Measured(suite_of(remaining), self.condition, remaining, samples)
+
 
 def suite_of(everyone: list[Flight]) -> str:
     """In words: the scenes and how many flights over each."""

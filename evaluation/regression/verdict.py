@@ -1,10 +1,10 @@
 """The verdict on each watched metric: better, worse, moved a little, or no difference seen.
 
-Both sides must be of one suite and one condition. The same flights on both sides are
-paired, and so are their trials one by one; entirely different flights are two samples.
-Better or worse needs two things: the change is consistent beyond chance, after Holm's
-correction for all metrics together, and it is at least as large as matters. What is beyond
-chance but smaller has moved; it is shown, and fails nothing.
+Both sides must be of one suite. The same flights on both sides are paired, and so are their
+trials one by one; entirely different flights are two samples. Better or worse needs two
+things: the change is consistent beyond chance, after Holm's correction for all metrics
+together, and it is at least as large as matters. What is beyond chance but smaller has moved;
+it is shown, and fails nothing.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class Comparison:
 
     Attributes:
         suite: The scenes, and how many flights over each.
-        condition: Under what both sides were measured.
+        condition: Under what `before` was measured.
         paired: Whether both sides flew the same flights.
         judged: In the order of `WATCHED`.
     """
@@ -107,7 +107,7 @@ def compare(before: Measured, after: Measured) -> Comparison:
     """Judge every watched metric.
 
     Raises:
-        InputError: Suites or conditions differ, or only some flights are the same.
+        InputError: Suites differ, or only some flights are the same.
     """
     paired = _paired(before, after)
     compared = [
@@ -129,10 +129,6 @@ def compare(before: Measured, after: Measured) -> Comparison:
 
 def _paired(before: Measured, after: Measured) -> bool:
     """Whether both flew the same flights; refuses what cannot be compared."""
-    if before.condition != after.condition:
-        raise InputError(
-            f"measured with {after.condition.label()}; expected {before.condition.label()}"
-        )
     if before.suite != after.suite:
         raise InputError(f"measured over {after.suite}; expected {before.suite}")
     shared = len(set(before.flights) & set(after.flights))
@@ -149,12 +145,20 @@ def _compared(metric: Metric, before: Samples, after: Samples, paired: bool) -> 
     if not any(before.values()) and not any(after.values()):
         return None
     if paired:
-        return _compared_pairs(metric, before, after)
+        differences, by_flight = paired_differences(metric, before, after)
+        effect = paired_effect(differences, metric.share)
+        return Compared(effect, len(differences), by_flight)
     return _compared_samples(metric, before, after)
 
 
-def _compared_pairs(metric: Metric, before: Samples, after: Samples) -> Compared:
-    """Trials are paired in their order; one that only one side has failed on the other."""
+def paired_differences(
+    metric: Metric, before: Samples, after: Samples
+) -> tuple[NDArray[np.float64], bool]:
+    """(N,) after minus before, and whether each is one flight's; else each is one trial's.
+
+    Trials are paired in their order; one that only one side has failed on the other. Some
+    flight must have a value.
+    """
     flights = []
     for flight in sorted(before.keys() | after.keys()):
         pairs = list(
@@ -166,10 +170,8 @@ def _compared_pairs(metric: Metric, before: Samples, after: Samples) -> Compared
     by_flight = _reaches(least_paired_p(len(flights)))
     if by_flight:
         middle = [float(d.mean()) if metric.share else median(d) for d in flights]
-        differences = np.array(middle)
-    else:
-        differences = np.concatenate(flights)
-    return Compared(paired_effect(differences, metric.share), len(differences), by_flight)
+        return np.array(middle), True
+    return np.concatenate(flights), False
 
 
 def _compared_samples(metric: Metric, before: Samples, after: Samples) -> Compared:

@@ -2,13 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd
 
 from evaluation.report.tables import MISSING, TextTable, degrees, metres
-from evaluation.results.table import Condition, ResultTable
+from evaluation.results.table import SEQUENCE_KEYS, Condition, ResultTable
+
+JUDGED_AFTER, LOCATED_M = 4, 0.25
+"""A sequence farther off than this after so many aerial maps failed."""
+REFINED_M, REFINED_DEG = 0.05, 2.0
+
+
+@dataclass(frozen=True)
+class Failure:
+    """One sequence that did not find its place, or one refinement that did not end there.
+
+    Attributes:
+        kind: "sequence" or "refinement".
+        scene, seed, flight, number: Which one.
+        result: How it ended.
+        said: What the pipeline said of it.
+        story: Step by step, for who wants to know more.
+    """
+
+    kind: str
+    scene: str
+    seed: int
+    flight: int
+    number: int
+    result: str
+    said: str
+    story: TextTable
+
+    @property
+    def key(self) -> tuple[str, str, int, int, int]:
+        """What names the same trial in another run."""
+        return self.kind, self.scene, self.seed, self.flight, self.number
+
+    @property
+    def title(self) -> str:
+        where = f"{self.scene}, seed {self.seed}, flight {self.flight}"
+        return f"{self.kind} {self.number} of {where}"
 
 
 def control_table(table: ResultTable, conditions: Sequence[Condition]) -> TextTable:
@@ -35,55 +71,82 @@ def control_table(table: ResultTable, conditions: Sequence[Condition]) -> TextTa
     return TextTable(header, tuple(rows))
 
 
-def failure_table(table: ResultTable) -> TextTable:
+def failures(table: ResultTable) -> list[Failure]:
     """Every failure of one condition: sequences beyond 0.25 m after 4, refinements off."""
-    rows = [*_failed_sequences(table), *_failed_trials(table)]
-    return TextTable(("what", "scene", "flight", "number", "result", "said"), tuple(rows))
+    return [*_failed_sequences(table), *_failed_trials(table)]
 
 
-def _failed_sequences(table: ResultTable) -> list[tuple[str, ...]]:
-    errors = table.sequences("error_m")
+def _failed_sequences(table: ResultTable) -> Iterator[Failure]:
+    errors, spreads = table.sequences("error_m"), table.sequences("spread_m")
     if len(errors) == 0:
-        return []
-    judged = min(4, errors.shape[1])
-    notes = table.rows("localization", "converged").set_index(
-        ["scene", "seed", "flight", "sequence", "iteration"]
-    )["note"]
-    rows: list[tuple[str, ...]] = []
-    for key, error in zip(errors.index.to_list(), errors.to_numpy(np.float64), strict=True):
-        off, finally_off = error[judged - 1], error[-1]
-        if off <= 0.25:
-            continue
-        scene, _, flight, sequence = key
-        result = f"{_off(off)} after {judged}, {_off(finally_off)} after {len(error)}"
-        said = str(notes.get((*key, judged), "")) or "position claimed"
-        rows.append(("sequence", str(scene), str(flight), str(sequence), result, said))
-    return rows
-
-
-def _failed_trials(table: ResultTable) -> list[tuple[str, ...]]:
-    trials = table.trials()
-    if "after_translation_m" not in trials:
-        return []
-    notes = table.rows("refinement", "accepted").set_index(["scene", "seed", "flight", "trial"])
-    rows: list[tuple[str, ...]] = []
-    accepted_at = trials["accepted"] if "accepted" in trials else pd.Series(1.0, trials.index)
-    for key, metres_off, degrees_off, accepted_value in zip(
-        trials.index.to_list(),
-        trials["after_translation_m"],
-        trials["after_rotation_deg"],
-        accepted_at,
+        return
+    judged = min(JUDGED_AFTER, errors.shape[1])
+    notes = table.rows("localization", "converged").set_index([*SEQUENCE_KEYS, "iteration"])["note"]
+    for key, error, spread in zip(
+        errors.index.to_list(),
+        errors.to_numpy(np.float64),
+        spreads.to_numpy(np.float64),
         strict=True,
     ):
-        scene, seed, flight, _, number = key
-        accepted = accepted_value > 0
-        if accepted and metres_off <= 0.05 and degrees_off <= 2.0:
+        if error[judged - 1] <= LOCATED_M:
             continue
-        note = notes["note"].get((scene, seed, flight, number), "") if len(notes) else ""
-        result = f"{_off(metres_off)}, {degrees(degrees_off)}"
-        said = f"refused: {note}" if not accepted else "accepted"
-        rows.append(("refinement", str(scene), str(flight), str(number), result, said))
-    return rows
+        said = [
+            str(notes.get((*key, n), "")) or "position claimed" for n in range(1, len(error) + 1)
+        ]
+        steps = tuple(
+            (str(n), _off(off), metres(wide), words)
+            for n, (off, wide, words) in enumerate(zip(error, spread, said, strict=True), 1)
+        )
+        result = f"{_off(error[judged - 1])} after {judged}"
+        if len(error) > judged:
+            result += f", {_off(error[-1])} after {len(error)}"
+        scene, seed, flight, sequence = key
+        yield Failure(
+            "sequence",
+            str(scene),
+            int(seed),
+            int(flight),
+            int(sequence),
+            result,
+            said[judged - 1],
+            TextTable(("aerial map", "error", "spread", "said"), steps),
+        )
+
+
+def _failed_trials(table: ResultTable) -> Iterator[Failure]:
+    trials = table.trials()
+    if "after_translation_m" not in trials:
+        return
+    rows = table.rows("refinement", "accepted")
+    notes = rows.set_index(["scene", "seed", "flight", "trial"])["note"]
+    for key, trial in zip(trials.index.to_list(), trials.to_dict("records"), strict=True):
+        accepted = trial.get("accepted", 1.0) > 0
+        off_m, off_deg = trial["after_translation_m"], trial["after_rotation_deg"]
+        if accepted and off_m <= REFINED_M and off_deg <= REFINED_DEG:
+            continue
+        scene, seed, flight, _, number = key
+        steps = tuple(
+            (title, _off(trial[f"{when}_translation_m"]), degrees(trial[f"{when}_rotation_deg"]))
+            for when, title in _MOMENTS
+            if f"{when}_translation_m" in trial
+        )
+        yield Failure(
+            "refinement",
+            str(scene),
+            int(seed),
+            int(flight),
+            int(number),
+            f"{_off(off_m)}, {degrees(off_deg)}",
+            "accepted" if accepted else f"refused: {notes.get((scene, seed, flight, number), '')}",
+            TextTable(("when", "position error", "angle error"), steps),
+        )
+
+
+_MOMENTS = (
+    ("before", "at the start"),
+    ("after", "after refinement"),
+    ("from_truth", "the same, started at the truth"),
+)
 
 
 def _off(metres_off: float) -> str:

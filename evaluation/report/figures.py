@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from evaluation.figures.before_after import BeforeAfter
@@ -29,7 +30,7 @@ COMPARED = len(SERIES)
 
 @dataclass(frozen=True)
 class Drawn:
-    """One condition as figures show it."""
+    """One condition, or one run of it, as figures show it."""
 
     condition: Condition
     table: ResultTable
@@ -46,9 +47,9 @@ def report_figures(
     drawn = _chosen(table, conditions)
     if conditions[0].poses != "oracle exact":
         yield from trajectory_figures(drawn[0].table, conditions[0])
-    yield from _localization(drawn)
+    yield from localization_figures(drawn)
     yield from calibration_figures(drawn[0].table, conditions[0])
-    yield from _refinement(drawn)
+    yield from refinement_figures(_distinct(drawn))
     yield from budget_figure(drawn[0].table, conditions[0])
     yield from _timing(drawn[0])
 
@@ -65,7 +66,8 @@ def _chosen(table: ResultTable, conditions: Sequence[Condition]) -> list[Drawn]:
     ]
 
 
-def _localization(drawn: list[Drawn]) -> Iterator[ReportFigure]:
+def localization_figures(drawn: list[Drawn]) -> Iterator[ReportFigure]:
+    """Fig. 11 and 12, side by side."""
     shown = [d for d in drawn if len(d.table.sequences("error_m"))]
     if not shown:
         return
@@ -95,8 +97,9 @@ def _per_sequence(drawn: list[Drawn], metric: str) -> dict[str, NDArray[np.float
     return {d.label: d.table.sequences(metric).to_numpy(np.float64) for d in drawn}
 
 
-def _refinement(drawn: list[Drawn]) -> Iterator[ReportFigure]:
-    shown = _distinct([d for d in drawn if "after_translation_m" in d.table.trials()])
+def refinement_figures(drawn: list[Drawn]) -> Iterator[ReportFigure]:
+    """Fig. 13 and 14, side by side."""
+    shown = [d for d in drawn if "after_translation_m" in d.table.trials()]
     if not shown:
         return
     counts = _counts(shown, [len(d.table.trials()) for d in shown], "trials")
@@ -136,10 +139,13 @@ def _distinct(drawn: list[Drawn]) -> list[Drawn]:
     """Without conditions that differ in localization only and so have the same trials."""
     kept: list[Drawn] = []
     for d in drawn:
-        after = d.table.trials()["after_translation_m"]
-        if not any(after.equals(k.table.trials()["after_translation_m"]) for k in kept):
+        if not any(_refined(d).equals(_refined(other)) for other in kept):
             kept.append(d)
     return kept
+
+
+def _refined(drawn: Drawn) -> pd.Series:
+    return drawn.table.trials().get("after_translation_m", pd.Series(dtype=np.float64))
 
 
 def _timing(primary: Drawn) -> Iterator[ReportFigure]:
@@ -169,7 +175,7 @@ def _counts(drawn: list[Drawn], counts: list[int], what: str) -> str:
 
 def _shared(conditions: list[Condition]) -> str:
     """What all conditions have in common, then what differs."""
-    if len(conditions) == 1:
+    if len(set(conditions)) == 1:
         return conditions[0].label()
     shared = shared_parts(conditions)
     return (f"all with {shared}: " if shared else "") + "; ".join(short_labels(conditions))

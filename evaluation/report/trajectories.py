@@ -56,7 +56,7 @@ def trajectory_table(table: ResultTable, conditions: Sequence[Condition]) -> Tex
     for robot, title in (("mav", "MAV"), ("ground", "ground robot")):
         for name, alignment, paper, metric, text, worst in _MEASURES:
             cells = [_cell(part, f"{robot}_{metric}", text, worst) for _, part in kept]
-            if set(cells) != {MISSING}:
+            if set(cells) - {MISSING}:
                 rows.append((f"{title}: {name}", alignment, paper.get(robot, MISSING), *cells))
     header = ("", "alignment", "paper (real robots)", *(label for label, _ in kept))
     return TextTable(header, tuple(rows))

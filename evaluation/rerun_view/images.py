@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import cv2
 import numpy as np
 import rerun as rr
@@ -36,7 +38,7 @@ class Images:
     """
 
     def __init__(
-        self, stream: SensorStream, level: Level, calibrations: dict[Source, RobotCalibration]
+        self, stream: SensorStream, level: Level, calibrations: Mapping[Source, RobotCalibration]
     ) -> None:
         self._stream, self._level = stream, level
         self._pace = {robot: Pace(level.image_hz) for robot in Source}

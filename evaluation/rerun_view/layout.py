@@ -15,16 +15,19 @@ EYE_M, TARGET_M = (-2.9, -3.4, 4.3), (1.3, 0.7, 0.2)
 """Of the view, in the ground robot's map: from behind its start, over its way."""
 
 
-def layout() -> rrb.Blueprint:
-    """The world on the left, what each stage makes on the right, curves below."""
+def layout(with_truth: bool) -> rrb.Blueprint:
+    """The world on the left, what each stage makes on the right, curves below.
+
+    Without truth no panel waits for it.
+    """
     return rrb.Blueprint(
         rrb.Vertical(
             rrb.Horizontal(
-                rrb.Vertical(_world(), _messages(), row_shares=[9, 2]),
-                _stages(),
+                rrb.Vertical(_world(with_truth), _messages(), row_shares=[9, 2]),
+                _stages(with_truth),
                 column_shares=[5, 4],
             ),
-            _curves(),
+            _curves(with_truth),
             row_shares=[7, 2],
         ),
         rrb.BlueprintPanel(state="collapsed"),
@@ -35,11 +38,12 @@ def layout() -> rrb.Blueprint:
     )
 
 
-def _world() -> rrb.Spatial3DView:
+def _world(with_truth: bool) -> rrb.Spatial3DView:
     """Both robots and their maps, in the ground robot's frame."""
     return rrb.Spatial3DView(
         origin="/",
-        name="world: ground map red, MAV's map grey, newest surface orange, truth pink",
+        name="world: ground map red, MAV's map grey, newest surface orange"
+        + (", truth pink" if with_truth else ""),
         contents=[
             "+ /ground/**",
             "+ /mav/**",
@@ -56,17 +60,18 @@ def _world() -> rrb.Spatial3DView:
     )
 
 
-def _stages() -> rrb.Vertical:
+def _stages(with_truth: bool) -> rrb.Vertical:
     error_mm = round(1e3 * ERROR_LIMIT_M)
+    depth = [_picture("/mav/depth_map", "depth map")]
+    if with_truth:
+        name = f"its error: blue near, red far, ±{error_mm} mm"
+        depth.append(_picture(f"{TRUTH}/depth_error", name))
     return rrb.Vertical(
         rrb.Horizontal(
             _image("/mav/camera/image", "MAV: image, corners"),
             _image("/ground/camera/image", "ground robot: image, corners"),
         ),
-        rrb.Horizontal(
-            _picture("/mav/depth_map", "depth map"),
-            _picture(f"{TRUTH}/depth_error", f"its error: blue near, red far, ±{error_mm} mm"),
-        ),
+        rrb.Horizontal(*depth),
         rrb.Horizontal(
             _picture("/localization/aerial_heights", "aerial heights"),
             _picture("/localization/ground_heights", "ground heights"),
@@ -94,17 +99,20 @@ def _messages() -> rrb.TextLogView:
     return rrb.TextLogView(origin="/events", name="what happened", columns=columns)
 
 
-def _curves() -> rrb.Horizontal:
-    return rrb.Horizontal(
+def _curves(with_truth: bool) -> rrb.Horizontal:
+    errors = [
         _plot(f"{ERRORS}/translation_m", "position error [m]"),
         _plot(f"{ERRORS}/rotation_deg", "angular error [deg]"),
+    ]
+    return rrb.Horizontal(
+        *(errors if with_truth else []),
         _plot("/curves/spread_m", "spread [m]"),
         rrb.Tabs(
             _plot("/curves/corners", "corners in the map"),
             _plot("/curves/sigma_mm", "sigma of the position [mm]"),
         ),
         _plot("/curves/stage_ms", "stage times [ms]"),
-        column_shares=[4, 4, 3, 4, 5],
+        column_shares=[*([4, 4] if with_truth else []), 3, 4, 5],
     )
 
 

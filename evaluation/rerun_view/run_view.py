@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from airground.core.cloud import Source
-from airground.io.recording import Recording
+from airground.core.messages import RobotCalibration
 from evaluation.rerun_view.curves import Curves
 from evaluation.rerun_view.depth_maps import DepthMaps
 from evaluation.rerun_view.images import Images
@@ -29,7 +29,8 @@ class RunView:
 
     Args:
         path: The .rrd file to write.
-        recording: What is run; its calibrations shape the frustums.
+        name: Of what is run, as the viewer shows it.
+        calibrations: Of both robots; they shape the frustums.
         truth: What is true; None leaves out errors and all else under `/truth`.
         level: How much is kept.
         viewer: Address of a viewer that listens; None for none.
@@ -38,19 +39,20 @@ class RunView:
     def __init__(
         self,
         path: Path,
-        recording: Recording,
+        name: str,
+        calibrations: Mapping[Source, RobotCalibration],
         truth: Truth | None,
         level: LevelName = "stages",
         viewer: str | None = None,
     ) -> None:
         chosen = LEVELS[level]
-        calibrations = {Source.MAV: recording.mav, Source.GROUND: recording.ground}
-        self._stream = stream = SensorStream(path, recording.path.name, layout(), viewer)
+        shown = layout(with_truth=truth is not None)
+        self._stream = stream = SensorStream(path, name, shown, viewer)
         self._parts: Sequence[Onlooker] = (
             Robots(stream, chosen),
             Images(stream, chosen, calibrations),
             DepthMaps(stream, chosen, truth),
-            Maps(stream, chosen, recording.ground.camera),
+            Maps(stream, chosen, calibrations[Source.GROUND].camera),
             Localization(stream, truth),
             Curves(stream, chosen, truth),
             Messages(stream),

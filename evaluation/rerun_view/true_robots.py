@@ -6,6 +6,8 @@ so that the drift of its SLAM shows.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import rerun as rr
 
@@ -43,7 +45,7 @@ class TrueRobots:
         stream: SensorStream,
         level: Level,
         truth: Truth,
-        calibrations: dict[Source, RobotCalibration],
+        calibrations: Mapping[Source, RobotCalibration],
     ) -> None:
         self._stream, self._truth = stream, truth
         self._pace = {robot: Pace(level.pose_hz) for robot in Source}

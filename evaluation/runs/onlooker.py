@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -16,8 +17,8 @@ class Seen:
 
     Attributes:
         event: What happened.
-        duration_ms: How long it took; of an event that says how an image was tracked, with
-            decoding.
+        duration_ms: How long it took; of an event that says how an image was tracked, the
+            wait for it.
         frame: The newest image that was tracked, with its pose.
         sighting: The newest aerial surface, with what both robots knew then; None before the
             first, and while a robot is lost.
@@ -34,3 +35,29 @@ class Onlooker(Protocol):
 
     def see(self, seen: Seen) -> None:
         """Take in one event; called in the order in which they happen."""
+
+
+class Audience:
+    """All who watch a run.
+
+    Args:
+        onlookers: They see every event, in this order.
+    """
+
+    def __init__(self, onlookers: Sequence[Onlooker]) -> None:
+        self._onlookers = onlookers
+        self._frame: TrackedFrame | None = None
+
+    def __bool__(self) -> bool:
+        return bool(self._onlookers)
+
+    def noted(self, frames: Iterable[TrackedFrame]) -> Iterator[TrackedFrame]:
+        """The frames as they go by."""
+        for self._frame in frames:
+            yield self._frame
+
+    def show(self, event: Event, duration_ms: float, sighting: Sighting | None) -> None:
+        """Let everyone see an event of the newest frame, while no stage runs."""
+        assert self._frame is not None
+        for onlooker in self._onlookers:
+            onlooker.see(Seen(event, duration_ms, self._frame, sighting))

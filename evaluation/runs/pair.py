@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,12 +21,15 @@ from airground.errors import InputError
 from airground.io.pair import Pair
 from airground.io.ply import write_ply
 from airground.io.tum import write_tum
-from airground.pipeline import Pipeline
+from airground.pipeline import Pipeline, sight
 from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
 from airground.tracking import FrontEnds, Trackers
+from airground.warm_up import warm_up
 from evaluation.protocol.setups import Setup
 from evaluation.runs.alone import error_against, of_pose_frame
+from evaluation.runs.onlooker import Audience, Onlooker
 from evaluation.runs.recording import pipeline_rng
+from evaluation.runs.timing import timed
 from evaluation.runs.tracking import front_end_rng
 from evaluation.runs.watched_front_end import WatchedFrontEnd
 from evaluation.truth.camera import true_camera
@@ -61,10 +65,16 @@ class PairResult:
         return Trajectory.from_poses([alignment.stamp_ns for alignment in accepted], poses)
 
 
-def run_pair(pair: Pair, setup: Setup, seed: int) -> PairResult:
+def run_pair(pair: Pair, setup: Setup, seed: int, onlookers: Sequence[Onlooker] = ()) -> PairResult:
     """Run the pipeline of Figure 4 from the first message to the last.
 
     A recording of ours that was exported and comes back gives the same result as itself.
+
+    Args:
+        pair: What both robots sensed.
+        setup: How the pipeline is set.
+        seed: Of all that is random.
+        onlookers: They see every event.
 
     Raises:
         InputError: The heading is to be known, but a robot has no magnetometer.
@@ -76,16 +86,22 @@ def run_pair(pair: Pair, setup: Setup, seed: int) -> PairResult:
         setup.config, pair.mav.calibration, pair.ground.calibration, pipeline_rng(seed)
     )
     setup.given.enter(pipeline)
+    audience, sighting = Audience(onlookers), None
+    if audience:  # who is shown times, without those of compiling
+        warm_up(setup.config, np.random.default_rng(0))
     surfaces = converged = 0
     alignments = []
-    for event in pipeline.run(trackers.frames(pair.messages())):
+    frames = audience.noted(trackers.frames(pair.messages()))
+    for event, duration_ms in timed(pipeline.run(frames)):
         match event:
             case SurfaceCast():
                 surfaces += 1
+                sighting = sight(event.surface, pipeline.mapping) if audience else None
             case BeliefUpdated():
                 converged += event.belief.converged
             case Aligned():
                 alignments.append(event.alignment)
+        audience.show(event, duration_ms, sighting)
     pipeline.mapping.correct_ground(trackers.finish())
     tracked = {
         robot: Tracked(ROBOTS[robot], one, one.trajectory(), ROBOTS[robot] in setup.slam_robots())

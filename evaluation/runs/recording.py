@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,7 +31,7 @@ from evaluation.protocol.setups import Setup
 from evaluation.realtime.drops import DropList, nothing_dropped
 from evaluation.results.row_writer import RowWriter
 from evaluation.results.table import ResultTable
-from evaluation.runs.onlooker import Onlooker, Seen
+from evaluation.runs.onlooker import Audience, Onlooker
 from evaluation.runs.timing import STAGE_OF, timed
 from evaluation.runs.tracking import TrackingHere, TrackingTask
 from evaluation.runs.tracking_process import TrackingProcess
@@ -166,14 +166,13 @@ class Measure:
         self._T_ground_mav: SE3 | None = None
         self._belief: Belief | None = None
         self._sighting: Sighting | None = None
-        self._onlookers = onlookers
-        self._frame: TrackedFrame | None = None
+        self._audience = Audience(onlookers)
 
     def run(self, frames: Iterable[TrackedFrame]) -> None:
         """Take in all frames, in order of time."""
-        for event, duration_ms in timed(self.pipeline.run(self._noted(frames))):
+        for event, duration_ms in timed(self.pipeline.run(self._audience.noted(frames))):
             self.take(event, duration_ms)
-            self._show(event, duration_ms)
+            self._audience.show(event, duration_ms, self._sighting)
 
     def result(self, tracked: dict[str, Tracked]) -> RunResult:
         """What the run leaves, once the front ends have finished."""
@@ -197,16 +196,6 @@ class Measure:
                 self._take_alignment(event, duration_ms)
         if type(event) in STAGE_OF and not isinstance(event, Aligned):
             self.out.add("timing", STAGE_OF[type(event)], duration_ms, "ms")
-
-    def _noted(self, frames: Iterable[TrackedFrame]) -> Iterator[TrackedFrame]:
-        for self._frame in frames:
-            yield self._frame
-
-    def _show(self, event: Event, duration_ms: float) -> None:
-        """Let onlookers see it, while no stage runs."""
-        assert self._frame is not None
-        for onlooker in self._onlookers:
-            onlooker.see(Seen(event, duration_ms, self._frame, self._sighting))
 
     def _take_belief(self, belief: Belief) -> None:
         self._belief = belief

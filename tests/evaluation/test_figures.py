@@ -2,6 +2,8 @@
 
 import dataclasses
 import hashlib
+import re
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +21,11 @@ from evaluation.figures.fig11_localization_error import localization_error_figur
 from evaluation.figures.fig13_refinement_translation import refinement_translation_figure
 from evaluation.figures.maps import draw_grid
 from evaluation.figures.refinement import refinement_figure
-from evaluation.figures.style import save_figure
+from evaluation.figures.style import COLUMN_IN, SMALL_PT, WIDE_IN, save_figure
 from evaluation.figures.table1_timing import timing_figure
+from evaluation.report.figures import report_figures
 from evaluation.showcase.showcase import Showcase
-from tests.evaluation.synthetic_results import make_showcase
+from tests.evaluation.synthetic_results import BEST, PAPER, make_showcase, make_table
 
 
 @pytest.fixture(scope="module")
@@ -147,3 +150,38 @@ def test_the_same_figure_gives_the_same_bytes(tmp_path: Path) -> None:
         ]
 
     assert digests("one") == digests("two")
+
+
+def test_every_figure_fits_a_paper(showcase: Showcase, tmp_path: Path) -> None:
+    table = make_table(conditions=(BEST, PAPER), sequences=3)
+    drawn = list(report_figures(table, [BEST, PAPER], showcase))
+    assert len(drawn) >= 11
+    for one in drawn:
+        save_figure(one.figure, tmp_path, one.name)
+        pdf = (tmp_path / f"{one.name}.pdf").read_bytes()
+        (box,) = re.findall(rb"/MediaBox \[ ?0 0 ([\d.]+) ", pdf)
+        assert float(box) / 72 == pytest.approx(WIDE_IN if one.wide else COLUMN_IN), one.name
+        assert b"/Type3" not in pdf, one.name
+        assert b"/FontFile2" in pdf, one.name
+        sizes = font_sizes_pt(pdf)
+        assert min(sizes) >= SMALL_PT, (one.name, sorted(sizes))
+
+
+def font_sizes_pt(pdf: bytes) -> set[float]:
+    """The sizes in which the text of a file of matplotlib's is set."""
+    sizes: set[float] = set()
+    for packed in re.findall(rb"stream\r?\n(.*?)\r?\nendstream", pdf, re.DOTALL):
+        try:
+            unpacked = zlib.decompress(packed)
+        except zlib.error:
+            continue
+        sizes |= {float(size) for size in re.findall(rb"/F\d+ ([\d.]+) Tf", unpacked)}
+    return sizes
+
+
+def test_errors_below_the_limits_keep_the_limits_on_the_axis() -> None:
+    errors = np.full((3, 24), 0.02)
+    figure = localization_error_figure({"one": errors})
+    boxes, near, _ = figure.axes
+    assert boxes.get_ylim()[1] > 0.5
+    assert len(near.get_xticks()) <= 14

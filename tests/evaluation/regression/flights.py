@@ -82,6 +82,8 @@ def _flight(
             add("localization", "spread_m", error("spread_m") / iteration, **where)
             add("localization", "converged", float(not far), **where)
     for trial in range(TRIALS):
+        add("refinement", "before_translation_m", 0.2, trial=trial)
+        add("refinement", "before_rotation_deg", 3.0, trial=trial)
         add("refinement", "after_translation_m", error("after_translation_m"), trial=trial)
         add("refinement", "after_rotation_deg", error("after_rotation_deg"), trial=trial)
         add("refinement", "accepted", 1.0, trial=trial)

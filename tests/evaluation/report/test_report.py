@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from evaluation.report.failures import control_table, failure_table
+from evaluation.report.failures import control_table, failures
 from evaluation.report.figures import report_figures
 from evaluation.report.headline import headlines
 from evaluation.report.page import write_report
@@ -119,6 +119,10 @@ def test_what_nobody_measured_has_no_row(table: ResultTable) -> None:
     assert "MAV poses, RMS error" not in names
 
 
+def test_poses_that_nobody_tracked_have_no_table(table: ResultTable) -> None:
+    assert trajectory_table(table, [BEST]).rows == ()
+
+
 def test_drift_is_shown_where_it_was_measured() -> None:
     rows = [Row("indoor_a", 1, 0, DRIFT, "trajectory", "mav_ate_se3_rmse_m", 0.0123, "m")]
     made = comparison_table(ResultTable.from_rows(rows), [DRIFT])
@@ -127,11 +131,24 @@ def test_drift_is_shown_where_it_was_measured() -> None:
 
 def test_every_failure_is_listed_with_its_reason(table: ResultTable) -> None:
     part = table.of(PAPER).without_controls()
-    made = failure_table(part)
+    made = failures(part)
     errors = part.sequences("error_m")[4].to_numpy(float)
-    listed = [row for row in made.rows if row[0] == "sequence"]
+    listed = [failure for failure in made if failure.kind == "sequence"]
     assert len(listed) == int((~(errors <= 0.25)).sum())
-    assert all(row[5] for row in made.rows)
+    assert all(failure.said for failure in made)
+    assert len({failure.key for failure in made}) == len(made)
+
+
+def test_every_failure_leads_to_what_happened(table: ResultTable, page: tuple[Path, str]) -> None:
+    _, html = page
+    listed = failures(table.of(BEST).without_controls())
+    assert listed
+    for failure in listed:
+        assert html.count(failure.title) == 1
+    hopeless = failures(table.of(PAPER).without_controls())
+    sequence = next(failure for failure in hopeless if failure.kind == "sequence")
+    assert [row[0] for row in sequence.story.rows] == [str(n) for n in range(1, 13)]
+    assert sequence.result.startswith(sequence.story.rows[3][1])
 
 
 def test_a_sequence_without_estimate_is_a_failure() -> None:
@@ -140,17 +157,10 @@ def test_a_sequence_without_estimate_is_a_failure() -> None:
         for i in range(1, 5)
         for metric, value in (("error_m", np.nan), ("converged", 0.0))
     ]
-    made = failure_table(ResultTable.from_rows(rows)).rows
-    assert made == (
-        (
-            "sequence",
-            "indoor_a",
-            "0",
-            "0",
-            "no estimate after 4, no estimate after 4",
-            "no overlap",
-        ),
-    )
+    (made,) = failures(ResultTable.from_rows(rows))
+    assert made.title == "sequence 0 of indoor_a, seed 1, flight 0"
+    assert made.result == "no estimate after 4"
+    assert made.said == "no overlap"
 
 
 def test_claims_are_counted_and_checked() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import cached_property
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -34,7 +33,6 @@ from airground.core.events import (
 from airground.core.messages import GroundImage, MavImage, RobotCalibration
 from airground.core.se3 import SE3
 from airground.core.surface import AerialSurface, DepthMap
-from airground.io.recording import Recording
 from airground.pipeline import Sighting
 from airground.slam.front_end import TrackedCorners, TrackedPose, Tracking
 from airground.tracking import TrackedFrame
@@ -101,7 +99,7 @@ class KnownTruth:
 
 
 TRUTH = cast(Truth, KnownTruth())
-RECORDING = cast(Recording, SimpleNamespace(mav=LENS, ground=LENS, path=Path("scripted")))
+NAME, LENSES = "scripted", dict.fromkeys(Source, LENS)
 
 
 def mav_frame(stamp_ns: int, tracking: Tracking = Tracking.TRACKED) -> TrackedFrame:
@@ -177,7 +175,7 @@ def written(
     events: list[Seen] | None = None,
 ) -> Path:
     """The .rrd file of the scripted run."""
-    view = RunView(path, RECORDING, truth, level)
+    view = RunView(path, NAME, LENSES, truth, level)
     show(view, seen_events() if events is None else events)
     view.close()
     return path

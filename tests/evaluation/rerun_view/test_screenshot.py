@@ -16,7 +16,7 @@ from rerun.experimental import ViewerClient
 from airground.errors import AirgroundError
 from evaluation.rerun_view import viewer
 from evaluation.rerun_view.run_view import RunView
-from tests.evaluation.rerun_view.scripted_run import RECORDING, TRUTH, seen_events, show, written
+from tests.evaluation.rerun_view.scripted_run import LENSES, NAME, TRUTH, seen_events, show, written
 
 WIDTH, HEIGHT = 1280, 800
 Answer = TypeVar("Answer")
@@ -89,7 +89,7 @@ def test_the_viewer_draws_every_panel(tmp_path: Path) -> None:
 def test_a_run_is_seen_while_it_happens(tmp_path: Path) -> None:
     ports = viewer.free_ports()
     with headless(ports) as opened:
-        view = RunView(tmp_path / "run.rrd", RECORDING, TRUTH, "all", ports.sink)
+        view = RunView(tmp_path / "run.rrd", NAME, LENSES, TRUTH, "all", ports.sink)
         show(view, seen_events())
         view.close()
         wait_for_the_run(opened)

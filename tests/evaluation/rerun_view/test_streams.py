@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ import pytest
 from PIL import Image
 
 from airground.core.se3 import SE3
+from evaluation.rerun_view.layout import layout
 from evaluation.rerun_view.level import LEVELS
 from evaluation.rerun_view.localization import ellipse_points, on_costs
 from evaluation.rerun_view.maps import GLIDE_NS
@@ -79,6 +81,22 @@ def test_there_is_one_timeline_and_it_is_sensor_time(read: ReadBack) -> None:
     assert read.timelines == {"sensor_time"}
     assert read.stamps_ns("/ground/camera") == [SECOND]
     assert read.stamps_ns("/mav/camera") == [2 * SECOND, 3 * SECOND]
+
+
+def test_without_truth_no_panel_waits_for_it() -> None:
+    every, rest = set(origins(layout(with_truth=True))), set(origins(layout(with_truth=False)))
+    assert rest == {origin for origin in every if not origin.startswith("/truth")}
+    assert "/truth/depth_error" in every
+
+
+def origins(shown: Any) -> Iterator[str]:
+    """What the panels of a layout show."""
+    part = getattr(shown, "root_container", shown)
+    for inner in getattr(part, "contents", None) or ():
+        if hasattr(inner, "origin"):
+            yield str(inner.origin)
+        elif not isinstance(inner, str):
+            yield from origins(inner)
 
 
 def test_without_truth_the_rest_is_the_same(read: ReadBack, tmp_path: Path) -> None:

@@ -18,7 +18,8 @@ from evaluation.commands.view import rerun_file
 from evaluation.rerun_view import viewer
 from evaluation.rerun_view.run_view import RunView
 from tests.evaluation.rerun_view.scripted_run import (
-    RECORDING,
+    LENSES,
+    NAME,
     TRUTH,
     ReadBack,
     seen_events,
@@ -132,7 +133,7 @@ def test_without_a_screen_a_window_is_refused(run: Path, monkeypatch: pytest.Mon
 def test_a_viewer_that_is_closed_meanwhile_leaves_the_file_whole(tmp_path: Path) -> None:
     ports, file = viewer.free_ports(), tmp_path / "run.rrd"
     with viewer.serving(ports) as server:
-        view = RunView(file, RECORDING, TRUTH, "all", ports.sink)
+        view = RunView(file, NAME, LENSES, TRUTH, "all", ports.sink)
         show(view, seen_events()[:8])
         server.kill()
         server.wait()
@@ -143,16 +144,15 @@ def test_a_viewer_that_is_closed_meanwhile_leaves_the_file_whole(tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    ("words", "alone", "realtime", "own", "complaint"),
+    ("words", "alone", "realtime", "complaint"),
     [
-        (LookWords(rerun_level="all"), False, False, False, "only with --rerun"),
-        (LookWords(rerun=True), True, False, False, "leave --only out"),
-        (LookWords(rerun_live=True), False, True, False, "--drops"),
-        (LookWords(rerun=True), False, False, True, "that simulate has written"),
+        (LookWords(rerun_level="all"), False, False, "only with --rerun"),
+        (LookWords(rerun=True), True, False, "leave --only out"),
+        (LookWords(rerun_live=True), False, True, "--drops"),
     ],
 )
 def test_words_without_a_meaning_are_refused(
-    words: LookWords, alone: bool, realtime: bool, own: bool, complaint: str
+    words: LookWords, alone: bool, realtime: bool, complaint: str
 ) -> None:
     with pytest.raises(InputError, match=complaint):
-        words.check_look_words(alone, realtime, own)
+        words.check_look_words(alone, realtime)

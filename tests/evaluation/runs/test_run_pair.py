@@ -34,6 +34,7 @@ from sim.presets import NOMINAL
 from sim.recorder import record
 from sim.scene import load_scene
 from tests.evaluation.plain_recordings import write_euroc_folder, write_tum_folder
+from tests.evaluation.rerun_view.scripted_run import ReadBack
 from tests.slam.synthetic_world import ground_sequence, mav_sequence
 
 FRAMES = 12
@@ -118,6 +119,31 @@ def test_both_plain_folders_run(tum: Path, euroc: Path, tmp_path: Path) -> None:
     cloud, _ = read_ply(out / "augmented_map.ply")
     assert sum(told["map_points"].values()) == len(cloud)
     assert (out / "config.toml").exists()
+
+
+def test_without_truth_all_else_is_drawn_and_nothing_changes(
+    tum: Path, euroc: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ("run", "--mav", euroc, "--ground", tum, "--heading", "search")
+    drawn, plain = tmp_path / "drawn", tmp_path / "plain"
+    assert airground(*words, "--rerun", "--rerun-level", "all", "--out", drawn) == console.EXIT_OK
+    assert airground(*words, "--out", plain) == console.EXIT_OK
+    for name in ("augmented_map.ply", "ground.tum"):
+        assert file_digest(drawn / name) == file_digest(plain / name)
+    assert not (plain / "run.rrd").exists()
+    assert airground("view", drawn, "--save", tmp_path / "saved.rrd") == console.EXIT_OK
+    assert airground("gallery", drawn, "--out", tmp_path / "pictures") == console.EXIT_ERROR
+    assert "held against a truth" in capsys.readouterr().err
+    read = ReadBack(tmp_path / "saved.rrd")
+    assert read.entities >= {
+        *("/ground/camera", "/ground/camera/image", "/ground/path", "/ground/map"),
+        *("/mav/camera/image", "/events"),
+    }
+    assert not [entity for entity in read.entities if entity.startswith("/truth")]
+    for robot in ("mav", "ground"):
+        assert len(read.stamps_ns(f"/{robot}/camera/image")) >= FRAMES
+    (tracked,) = [t for t in read.values("/events", "TextLog:text") if "ground robot: tr" in t[0]]
+    assert tracked == ["ground robot: tracked"]
 
 
 def test_files_replace_the_stages_and_the_summary_says_so(

@@ -1,0 +1,1 @@
+"""Two or more runs on one page: what changed, beyond chance or not."""
