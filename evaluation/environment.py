@@ -78,6 +78,13 @@ def _keep_freed_memory() -> None:
     mallopt(_M_TRIM_THRESHOLD, KEPT_BYTES)
 
 
+def hand_back_memory() -> None:
+    """Return to the system what was kept of freed memory, before other work begins."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # only glibc can be asked
+    if trim is not None:
+        trim(0)
+
+
 def _loads(soname: str) -> bool:
     try:
         ctypes.CDLL(soname)

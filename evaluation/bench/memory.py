@@ -8,10 +8,11 @@ kept of earlier work is handed back first, or a stage could live on it unseen.
 
 from __future__ import annotations
 
-import ctypes
 import gc
 from collections.abc import Callable
 from pathlib import Path
+
+from evaluation.environment import hand_back_memory
 
 STATUS = Path("/proc/self/status")
 CLEAR_REFS = Path("/proc/self/clear_refs")
@@ -21,7 +22,7 @@ RESET_HIGH_WATER_MARK = "5"
 def peak_memory_mib(call: Callable[[], object]) -> float | None:
     """What a call adds to the resident memory at its peak [MiB]; None where nobody counts it."""
     gc.collect()
-    _hand_back()
+    hand_back_memory()
     try:
         CLEAR_REFS.write_text(RESET_HIGH_WATER_MARK, encoding="ascii")
         before = _kib("VmRSS")
@@ -44,10 +45,3 @@ def _kib(key: str, status: Path = STATUS) -> int:
         if line.startswith(f"{key}:"):
             return int(line.split()[1])
     raise OSError(f"{status} has no {key}")
-
-
-def _hand_back() -> None:
-    """Ask the C library to return what it keeps; only glibc can be asked."""
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-    if trim is not None:
-        trim(0)

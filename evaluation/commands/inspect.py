@@ -15,8 +15,8 @@ from evaluation.commands.words import Verb
 class Inspect(Verb):
     """Say what is in a dataset, and what is wrong with it.
 
-    For recordings of ours, EuRoC and TUM RGB-D folders: digests, rates, gaps, calibration, and
-    whether the true poses fit the images. Exits with 1 if something is wrong.
+    For recordings of ours, datasets of many, EuRoC and TUM RGB-D folders: digests, rates, gaps,
+    calibration, and whether the true poses fit the images. Exits with 1 if something is wrong.
     """
 
     dataset: Annotated[Positional[Path], arg(metavar="DATASET")]

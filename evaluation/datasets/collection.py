@@ -24,7 +24,7 @@ from rich.progress import track
 from airground.errors import AirgroundError, InputError
 from evaluation.checked_json import read_checked
 from evaluation.datasets.datasheet import datasheet
-from evaluation.datasets.plan import Plan, World
+from evaluation.datasets.plan import PLAN, Plan, World
 from evaluation.output import check_free
 from evaluation.units.crew import Crew
 from sim.interrupts import end_with_parent
@@ -32,7 +32,7 @@ from sim.presets import sensor_preset
 from sim.recorder import record
 from sim.scene import load_scene
 
-PLAN, SHEET, LOCK = "dataset.json", "DATASHEET.md", ".lock"
+SHEET, LOCK = "DATASHEET.md", ".lock"
 
 
 def make_dataset(plan: Plan, out: Path, jobs: int, threads: int) -> None:

@@ -13,6 +13,8 @@ from airground.io.digests import bytes_digest
 from sim.presets import sensor_preset
 from sim.scene import load_scene
 
+PLAN = "dataset.json"
+"""The plan's file in the dataset."""
 REST = "train"
 MAX_SEEDS = 100_000
 

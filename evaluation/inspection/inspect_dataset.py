@@ -1,7 +1,8 @@
-"""Looks at a dataset: a recording of ours, a plain EuRoC or a plain TUM RGB-D folder."""
+"""Looks at a dataset: recordings of ours, a plain EuRoC or a plain TUM RGB-D folder."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,8 @@ from airground.io.plain_euroc import euroc_folder
 from airground.io.plain_tum import is_tum_folder
 from airground.io.recording import Recording
 from airground.io.robot_recording import RobotRecording
+from evaluation.checked_json import read_checked
+from evaluation.datasets.plan import PLAN, Plan
 from evaluation.inspection.findings import Finding, Verdict
 from evaluation.inspection.rhythm import look_at_stamps
 from evaluation.inspection.truth_against_images import hold_truth_against_images, look_at_truth
@@ -25,7 +28,7 @@ DEPTH_SAMPLES = 10
 
 
 def inspect_dataset(path: Path, calibration_file: Path | None = None) -> tuple[str, list[Finding]]:
-    """Its layout ("airground", "euroc" or "tum"), and what is in it.
+    """Its layout ("airground", "dataset" of many, "euroc" or "tum"), and what is in it.
 
     What keeps a dataset from being read at all is a finding, too.
 
@@ -40,14 +43,32 @@ def inspect_dataset(path: Path, calibration_file: Path | None = None) -> tuple[s
         raise InputError(f"{path}: no such folder")
     if (path / HEADER).exists():
         return "airground", _ours(path)
+    if (path / PLAN).exists():
+        return "dataset", _many(path)
     if euroc_folder(path) is not None:
         return "euroc", _robot(path, Source.MAV, calibration_file)
     if is_tum_folder(path):
         return "tum", _robot(path, Source.GROUND, calibration_file)
     raise InputError(
-        f"{path}: holds neither {HEADER} (a recording of ours) nor mav0/cam0 (EuRoC) nor rgb.txt "
-        "(TUM RGB-D)"
+        f"{path}: holds neither {HEADER} (a recording of ours) nor {PLAN} (a dataset of ours) nor "
+        "mav0/cam0 (EuRoC) nor rgb.txt (TUM RGB-D)"
     )
+
+
+def _many(path: Path) -> list[Finding]:
+    """What is in each recording of a dataset, and whether all that were planned are there."""
+    plan = read_checked(Plan, path / PLAN, "plan of a dataset")
+    planned = {world.folder for world in plan.worlds}
+    there = {str(file.parent.relative_to(path)) for file in path.glob(f"*/*/{HEADER}")}
+    found = f"{len(there & planned)} of {len(planned)} planned"
+    findings = [Finding("", "recordings", found)]
+    for name in sorted(planned - there):
+        findings.append(Finding(name, "recording", "is missing", Verdict.WRONG))
+    for name in sorted(there - planned):
+        findings.append(Finding(name, "recording", "was not planned", Verdict.WRONG))
+    for name in sorted(there & planned):
+        findings += [replace(one, part=f"{name} {one.part}") for one in _ours(path / name)]
+    return findings
 
 
 def _ours(path: Path) -> list[Finding]:

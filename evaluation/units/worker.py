@@ -7,10 +7,11 @@ import os
 import signal
 import tempfile
 import threading
+from typing import Any
 
 from distributed import Worker, WorkerPlugin
 
-from evaluation.environment import prepare
+from evaluation.environment import hand_back_memory, prepare
 
 
 class PreparedWorker(WorkerPlugin):
@@ -36,6 +37,11 @@ class PreparedWorker(WorkerPlugin):
             tempfile.tempdir = self.scratch
         if threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who started it
+
+    def transition(self, key: Any, start: str, finish: str, **kwargs: Any) -> None:
+        """Called by Dask as a task goes on: the next one starts with the memory of the first."""
+        if start == "executing":
+            hand_back_memory()
 
 
 def unfit(dask_worker: Worker) -> str | None:

@@ -15,6 +15,7 @@ from airground.core.trajectory import Trajectory
 from airground.errors import InputError
 from airground.io.tum import read_tum, write_tum
 from evaluation import cli
+from evaluation.datasets.plan import Plan, World
 from evaluation.datasets.simulated import Simulated
 from evaluation.inspection.findings import Finding, Verdict
 from evaluation.inspection.inspect_dataset import inspect_dataset
@@ -71,6 +72,25 @@ def test_the_exit_code_and_the_json_tell_what_is_wrong(
     (one,) = [finding for finding in told["findings"] if finding["verdict"] == "wrong"]
     assert one["subject"] == "digests"
     assert "ground/rgb: differs" in one["found"]
+
+
+def test_all_recordings_of_a_dataset_are_looked_at(small: Path, tmp_path: Path) -> None:
+    worlds = tuple(
+        World(scene="small", name="small", digest="", seed=seed, part=part)
+        for seed, part in ((0, "train"), (1, "train"), (2, "test"))
+    )
+    plan = Plan(sensors="nominal", duration_s=None, worlds=worlds)
+    (tmp_path / "dataset.json").write_text(plan.model_dump_json())
+    for folder in ("train/small_s0", "test/small_s2", "test/small_s7"):
+        shutil.copytree(small, tmp_path / folder)
+    (tmp_path / "test/small_s2/ground/rgb.txt").write_text("changed")
+    layout, findings = inspect_dataset(tmp_path)
+    assert layout == "dataset"
+    assert of(findings, "", "recordings").found == "2 of 3 planned"
+    told = wrong(findings)
+    assert told[:2] == [("train/small_s1", "recording"), ("test/small_s7", "recording")]
+    assert {part.split()[0] for part, _ in told[2:]} == {"test/small_s2"}
+    assert of(findings, "train/small_s0 mav", "images").found.startswith("21 at 30.0 Hz")
 
 
 def test_what_cannot_be_read_is_a_finding(small: Path, tmp_path: Path) -> None:
