@@ -54,18 +54,53 @@ def surface_cloud(
     volume: Volume, depth: NDArray[np.float32], normals: NDArray[np.float32], reference: DepthMap
 ) -> PointCloud:
     """The cast points in the MAV's map, with the grey values of the reference view."""
-    seen = np.isfinite(depth)
-    points = volume.camera.rays()[seen] * depth[seen][:, None]
-    rows, columns = np.nonzero(seen)
-    image = reference.image
-    grey = image[
-        rows * image.shape[0] // depth.shape[0], columns * image.shape[1] // depth.shape[1]
-    ]
+    camera, T_mav_camera = volume.camera, volume.T_mav_camera
+    intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
     return PointCloud(
-        (volume.T_mav_camera @ points).astype(np.float32),
-        np.repeat(grey[:, None], 3, axis=1),
-        (normals[seen].astype(np.float64) @ volume.T_mav_camera.rotation.T).astype(np.float32),
+        *_seen_points(
+            depth,
+            normals,
+            reference.image,
+            intrinsics,
+            T_mav_camera.rotation,
+            T_mav_camera.translation,
+        )
     )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _seen_points(
+    depth: NDArray,
+    normals: NDArray,
+    image: NDArray,
+    intrinsics: NDArray,
+    rotation: NDArray,
+    translation: NDArray,
+) -> tuple[NDArray, NDArray, NDArray]:
+    """(N, 3) float32 points, (N, 3) uint8 colours and (N, 3) float32 normals, row by row."""
+    rows, columns = depth.shape
+    fx, fy, cx, cy = intrinsics
+    count = np.isfinite(depth).sum()
+    points = np.empty((count, 3), np.float32)
+    colours = np.empty((count, 3), np.uint8)
+    turned = np.empty((count, 3), np.float32)
+    at = 0
+    for row in range(rows):
+        y = (row - cy) / fy
+        for column in range(columns):
+            z = np.float64(depth[row, column])
+            if not np.isfinite(z):
+                continue
+            x = (column - cx) / fx
+            grey = image[row * image.shape[0] // rows, column * image.shape[1] // columns]
+            nx, ny, nz = normals[row, column]
+            for axis in range(3):
+                r0, r1, r2 = rotation[axis]
+                points[at, axis] = z * (r0 * x + r1 * y + r2) + translation[axis]
+                turned[at, axis] = r0 * nx + r1 * ny + r2 * nz
+                colours[at, axis] = grey
+            at += 1
+    return points, colours, turned
 
 
 @njit(cache=True, inline="always")

@@ -89,6 +89,29 @@ def test_true_depth_comes_back_within_a_voxel() -> None:
     assert np.median(cloud.normals[floor] @ np.array([0, 0, 1])) > 0.98
 
 
+@pytest.mark.kernel
+def test_seen_points_equal_arrays_of_them() -> None:
+    rng = np.random.default_rng(4)
+    T_mav_camera = SE3.exp(rng.normal(0, 0.5, 6))
+    volume = Volume(resized(CAMERA, 15, 11), T_mav_camera, 1.0, 2.0, 5)
+    depth = rng.uniform(1, 2, (11, 15)).astype(np.float32)
+    depth[rng.random((11, 15)) < 0.3] = np.nan
+    normals = rng.normal(0, 1, (11, 15, 3)).astype(np.float32)
+    shape = CAMERA.height, CAMERA.width
+    image = rng.integers(0, 256, shape, np.uint8)
+    reference = DepthMap(0, CAMERA, T_mav_camera, np.ones(shape, np.float32), image, 1)
+    cloud = surface_cloud(volume, depth, normals, reference)
+    seen = np.isfinite(depth)
+    points = T_mav_camera @ (volume.camera.rays()[seen] * depth[seen][:, None])
+    np.testing.assert_allclose(cloud.points, points, atol=1e-6)
+    np.testing.assert_allclose(cloud.normals, normals[seen] @ T_mav_camera.rotation.T, atol=1e-6)
+    rows, columns = np.nonzero(seen)
+    grey = image[rows * shape[0] // 11, columns * shape[1] // 15]
+    assert np.array_equal(cloud.colours, np.repeat(grey[:, None], 3, axis=1))
+    nothing = surface_cloud(volume, np.full_like(depth, np.nan), normals, reference)
+    assert len(nothing) == 0
+
+
 def test_no_point_where_too_few_maps_agree() -> None:
     volume = Volume(resized(CAMERA, 8, 6), SE3.identity(), 1.0, 2.0, 11)
     phi = np.ones(volume.shape, np.float32)
