@@ -18,6 +18,34 @@ BLOCK = 512
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def about_mean(
+    heights: NDArray[np.float32], margin: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32], float]:
+    """Heights with NaN in holes as heights about their mean, 0 in holes; the mask; the mean.
+
+    Args:
+        heights: (nx, ny) [m].
+        margin: Empty cells to put around.
+    """
+    nx, ny = heights.shape
+    total, count = 0.0, 0
+    for i in range(nx):
+        for j in range(ny):
+            if np.isfinite(heights[i, j]):
+                total += heights[i, j]
+                count += 1
+    mean = total / max(count, 1)
+    centred = np.zeros((nx + 2 * margin, ny + 2 * margin), np.float32)
+    mask = np.zeros((nx + 2 * margin, ny + 2 * margin), np.float32)
+    for i in range(nx):
+        for j in range(ny):
+            if np.isfinite(heights[i, j]):
+                centred[i + margin, j + margin] = heights[i, j] - np.float32(mean)
+                mask[i + margin, j + margin] = 1
+    return centred, mask, mean
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def zmssd(sums: NDArray, min_count: float) -> NDArray[np.float32]:
     """Eq. 2 [m^2] for sums (N, 6); NaN where fewer than `min_count` cells overlap."""
     costs = np.empty(len(sums), np.float32)

@@ -18,6 +18,7 @@ from airground.localization.cost_kernels import (
     SUM_AG,
     SUM_G,
     SUM_GG,
+    about_mean,
     one_minus_correlation,
     sums_at_poses,
     sums_at_positions,
@@ -39,11 +40,7 @@ class Masked:
 
 def masked(heights: NDArray[np.float32], margin: int = 0) -> Masked:
     """Split heights with NaN into values and mask, with `margin` empty cells around."""
-    filled = np.isfinite(heights)
-    mean = float(heights[filled].mean(dtype=np.float64)) if filled.any() else 0.0
-    values = np.where(filled, heights - np.float32(mean), np.float32(0))
-    mask = filled.astype(np.float32)
-    return Masked(np.pad(values, margin), np.pad(mask, margin), mean)
+    return Masked(*about_mean(heights, margin))
 
 
 def costs_of(sums: NDArray, aerial_cells: int, config: Localization) -> NDArray[np.float32]:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from airground.config import Localization
 from airground.core.belief import HeightMap
-from airground.localization.cost_map import compute_cost_map, overlay_at, overlay_turned
+from airground.localization.cost_map import compute_cost_map, masked, overlay_at, overlay_turned
 from tests.localization import naive
 
 CELLS_PER_M = 10.0
@@ -141,3 +141,20 @@ def test_flat_ground_correlates_with_nothing():
     aerial = HeightMap(noise[10:30, 10:30], np.array([-1.0, -1.0]), CELLS_PER_M)
     costs = compute_cost_map(aerial, ground, (0, 0), 0.0, config("ncc")).costs
     assert np.nanmin(costs) > 0.95
+
+
+@pytest.mark.kernel
+def test_heights_about_their_mean_are_those_of_arrays() -> None:
+    heights = np.random.default_rng(0).normal(3, 1, (7, 5)).astype(np.float32)
+    heights[1, 2:] = np.nan
+    filled = np.isfinite(heights)
+    split = masked(heights, margin=2)
+    assert split.mean == pytest.approx(np.nanmean(heights, dtype=np.float64), abs=1e-12)
+    centred = np.where(filled, heights - np.float32(split.mean), 0)
+    assert np.array_equal(split.heights, np.pad(centred, 2))
+    assert np.array_equal(split.mask, np.pad(filled, 2))
+    assert split.heights.dtype == split.mask.dtype == np.float32
+    empty = masked(np.full((3, 4), np.nan, np.float32))
+    assert empty.mean == 0
+    assert not empty.heights.any()
+    assert not empty.mask.any()
