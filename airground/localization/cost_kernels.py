@@ -32,7 +32,7 @@ def about_mean(
     for i in range(nx):
         for j in range(ny):
             if np.isfinite(heights[i, j]):
-                total += heights[i, j]
+                total += np.float64(heights[i, j])
                 count += 1
     mean = total / max(count, 1)
     centred = np.zeros((nx + 2 * margin, ny + 2 * margin), np.float32)
