@@ -20,7 +20,7 @@ test: $(READY)
 	$(PYTHON_IN_VENV) -m pytest -q -m "not slow"
 
 test-slow: $(READY)
-	$(PYTHON_IN_VENV) -m pytest -q -m slow
+	$(PYTHON_IN_VENV) -m pytest -q -m slow --durations=10
 
 check: $(READY)
 	$(PYTHON_IN_VENV) -m ruff check .
