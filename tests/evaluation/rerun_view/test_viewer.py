@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import socket
 import sys
@@ -40,8 +41,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def listening(process: int) -> dict[int, str]:
     """Port and address (hexadecimal, as the kernel writes it) of a process's open sockets."""
-    folder = Path(f"/proc/{process}/fd")
-    links = [os.readlink(entry) for entry in folder.iterdir()]
+    links = []
+    for entry in Path(f"/proc/{process}/fd").iterdir():
+        with contextlib.suppress(FileNotFoundError):  # closed meanwhile
+            links.append(os.readlink(entry))
     sockets = {link[8:-1] for link in links if link.startswith("socket:[")}
     found = {}
     for table in ("tcp", "tcp6"):
