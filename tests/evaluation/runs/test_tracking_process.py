@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import signal
+import time
 from pathlib import Path
 
 import pytest
@@ -75,7 +76,11 @@ def test_frames_can_be_kept(small: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(tracking_process, "FRAMES_AHEAD", 2)
     with TrackingProcess(task(small)) as apart:
         apart.wait_until_ready()
-        frames = list(apart.frames())
+        frames = []
+        for frame in apart.frames():
+            if not frames:
+                time.sleep(1.0)  # tracking would be far ahead, if it did not wait for a free slot
+            frames.append(frame)
     recording = Recording.open(small)
     for frame in frames:
         if isinstance(frame.image, GroundImage):
