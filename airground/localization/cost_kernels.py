@@ -8,13 +8,11 @@ axis of these six, in this order.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 COUNT, SUM_A, SUM_G, SUM_AA, SUM_GG, SUM_AG = range(6)
 KEEPS_NAN = {"contract", "reassoc", "arcp", "nsz"}
-BLOCK = 512
-"""Cells that are placed, looked up and added up at a time, so that they stay in the cache."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -165,133 +163,6 @@ def _add_row(
         sum_aa += valid * a * a
         sum_gg += valid * g * g
         sum_ag += valid * a * g
-    sums[0] += n
-    sums[1] += sum_a
-    sums[2] += sum_g
-    sums[3] += sum_aa
-    sums[4] += sum_gg
-    sums[5] += sum_ag
-
-
-@njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=KEEPS_NAN)
-def sums_at_poses(
-    cells: NDArray[np.float32], ground: NDArray[np.float32], poses: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """The six sums (M, 6) for M poses of a turned aerial map.
-
-    Args:
-        cells: (3, K) filled aerial cells: x, y [cells] from the camera, height [m].
-        ground: Heights with NaN in holes, at least two empty cells around the edge.
-        poses: (M, 3) index of the camera in `ground` [cells], and heading [rad].
-    """
-    sums = np.zeros((len(poses), 6))
-    columns = ground.shape[1]
-    flat = ground.ravel()
-    last = np.float32(ground.shape[0] - 2), np.float32(columns - 2)
-    for p in prange(len(poses)):
-        place = np.float32(poses[p, 0]), np.float32(poses[p, 1])
-        turn = np.float32(np.cos(poses[p, 2])), np.float32(np.sin(poses[p, 2]))
-        index = np.empty(BLOCK, np.uint32)
-        fractions = np.empty((2, BLOCK), np.float32)
-        heights = np.empty((4, BLOCK), np.float32)
-        for begin in range(0, cells.shape[1], BLOCK):
-            n = min(BLOCK, cells.shape[1] - begin)
-            # One-dimensional slices: only these are known to be contiguous.
-            x, y = cells[0, begin : begin + n], cells[1, begin : begin + n]
-            _place_cells(x, y, place, turn, last, columns, index, fractions[0], fractions[1])
-            _look_up(flat, columns, index, n, heights[0], heights[1], heights[2], heights[3])
-            _add_cells(
-                cells[2, begin : begin + n],
-                fractions[0],
-                fractions[1],
-                heights[0],
-                heights[1],
-                heights[2],
-                heights[3],
-                sums[p],
-            )
-    return sums
-
-
-@njit(cache=True, error_model="numpy", fastmath=KEEPS_NAN)
-def _place_cells(
-    cell_x: NDArray,
-    cell_y: NDArray,
-    place: tuple[np.float32, np.float32],
-    turn: tuple[np.float32, np.float32],
-    last: tuple[np.float32, np.float32],
-    columns: int,
-    index: NDArray,
-    fraction_x: NDArray,
-    fraction_y: NDArray,
-) -> None:
-    """Where cells fall in the ground map: flat index of the corner before, and the rest."""
-    (x0, y0), (c, s), (last_x, last_y) = place, turn, last
-    zero, stride = np.float32(0), np.int32(columns)
-    for i in range(len(cell_x)):
-        # Clamped to the empty edge, where nothing counts.
-        x = min(max(x0 + c * cell_x[i] - s * cell_y[i], zero), last_x)
-        y = min(max(y0 + s * cell_x[i] + c * cell_y[i], zero), last_y)
-        ix, iy = np.int32(x), np.int32(y)
-        fraction_x[i], fraction_y[i] = x - np.float32(ix), y - np.float32(iy)
-        index[i] = np.uint32(np.int32(ix * stride) + iy)
-
-
-@njit(cache=True, error_model="numpy")
-def _look_up(
-    ground: NDArray,
-    columns: int,
-    index: NDArray,
-    n: int,
-    g00: NDArray,
-    g01: NDArray,
-    g10: NDArray,
-    g11: NDArray,
-) -> None:
-    """The heights at the four corners around each of n places."""
-    right, below, across = ground[1:], ground[columns:], ground[columns + 1 :]
-    for i in range(n):
-        at = index[i]
-        g00[i], g01[i], g10[i], g11[i] = ground[at], right[at], below[at], across[at]
-
-
-@njit(cache=True, error_model="numpy", fastmath=KEEPS_NAN)
-def _add_cells(
-    aerial: NDArray,
-    fraction_x: NDArray,
-    fraction_y: NDArray,
-    g00: NDArray,
-    g01: NDArray,
-    g10: NDArray,
-    g11: NDArray,
-    sums: NDArray,
-) -> None:
-    """Add cells to the sums, given their fractions and the ground at their four corners."""
-    zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
-    n, sum_a, sum_g, sum_aa, sum_gg, sum_ag = zero, zero, zero, zero, zero, zero
-    for i in range(len(aerial)):
-        wx, wy = fraction_x[i], fraction_y[i]
-        w11 = wx * wy
-        w10, w01 = wx - w11, wy - w11
-        w00 = one - wx - w01
-        w00 = w00 if g00[i] == g00[i] else zero
-        w01 = w01 if g01[i] == g01[i] else zero
-        w10 = w10 if g10[i] == g10[i] else zero
-        w11 = w11 if g11[i] == g11[i] else zero
-        weight = w00 + w01 + w10 + w11
-        height = w00 * (g00[i] if g00[i] == g00[i] else zero)
-        height += w01 * (g01[i] if g01[i] == g01[i] else zero)
-        height += w10 * (g10[i] if g10[i] == g10[i] else zero)
-        height += w11 * (g11[i] if g11[i] == g11[i] else zero)
-        valid = one if weight >= half else zero
-        g = height / weight if weight >= half else zero
-        a = valid * aerial[i]
-        n += valid
-        sum_a += a
-        sum_g += g
-        sum_aa += a * a
-        sum_gg += g * g
-        sum_ag += a * g
     sums[0] += n
     sums[1] += sum_a
     sums[2] += sum_g

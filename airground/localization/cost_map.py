@@ -20,10 +20,10 @@ from airground.localization.cost_kernels import (
     SUM_GG,
     about_mean,
     one_minus_correlation,
-    sums_at_poses,
     sums_at_positions,
     zmssd,
 )
+from airground.localization.turned_kernels import MARGIN, filled_cells, paired, sums_at_poses
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,13 +98,14 @@ class OffsetSearch:
         canvas = np.full(tuple(self._reach[1] - self._reach[0] + 1), np.nan, np.float32)
         nx, ny = aerial.heights.shape
         canvas[offset[0] : offset[0] + nx, offset[1] : offset[1] + ny] = aerial.heights
-        mask_a, a, aa = (spectrum.conj() for spectrum in self._transform(masked(canvas)))
+        mask_a, a, aa = (np.conj(s, out=s) for s in self._transform(masked(canvas)))
         mask_g, g, gg = self._spectra
         sums = np.empty((*self.shape, 6), np.float32)
-        products = (mask_a * mask_g, a * mask_g, mask_a * g, aa * mask_g, mask_a * gg, a * g)
-        for index, product in enumerate(products):
-            correlation = fft.irfft2(product, self._fft_shape, overwrite_x=True)
-            sums[..., index] = correlation[: self.shape[0], : self.shape[1]]
+        pairs = ((mask_a, mask_g), (a, mask_g), (mask_a, g), (aa, mask_g), (mask_a, gg), (a, g))
+        product = np.empty_like(mask_g)
+        for index, (aerial_spectrum, ground_spectrum) in enumerate(pairs):
+            np.multiply(aerial_spectrum, ground_spectrum, out=product)
+            self._correlate(product, sums[..., index])
         np.rint(sums[..., COUNT], out=sums[..., COUNT])
         return sums
 
@@ -120,8 +121,23 @@ class OffsetSearch:
 
     def _transform(self, patch: Masked) -> tuple[NDArray, NDArray, NDArray]:
         images = (patch.mask, patch.heights, patch.heights**2)
-        mask, heights, squares = (fft.rfft2(image, self._fft_shape) for image in images)
+        mask, heights, squares = (self._spectrum(image) for image in images)
         return mask, heights, squares
+
+    def _spectrum(self, image: NDArray[np.float32]) -> NDArray[np.complex64]:
+        """`rfft2` of the image with zeros around, not spent on the rows that are all zeros."""
+        rows, columns = self._fft_shape
+        return fft.fft(fft.rfft(image, columns, axis=1), rows, axis=0, overwrite_x=True)
+
+    def _correlate(self, product: NDArray[np.complex64], out: NDArray[np.float32]) -> None:
+        """`irfft2` of a product of spectra, not spent on rows that are no offset.
+
+        The product's memory is used up: fresh memory costs as much as multiplying does.
+        """
+        rows, columns = self._fft_shape
+        spectra = fft.ifft(product, axis=0, norm="forward", overwrite_x=True)
+        lines = fft.irfft(spectra[: len(out)], columns, axis=1, norm="forward", overwrite_x=True)
+        np.multiply(lines[:, : out.shape[1]], np.float32(1 / (rows * columns)), out=out)
 
 
 def compute_cost_map(
@@ -206,15 +222,12 @@ def overlay_at(aerial: HeightMap, ground: HeightMap, positions: NDArray) -> Over
 
 def overlay_turned(aerial: HeightMap, ground: HeightMap, poses: NDArray) -> Overlays:
     """The same for M poses (M, 3): x, y [m], and a turn of the aerial map [rad]."""
-    a, g = masked(aerial.heights), masked(ground.heights, margin=2)
-    ix, iy = np.nonzero(a.mask)
-    first = lattice_index(aerial)
-    cells = np.array([ix + first[0], iy + first[1], a.heights[ix, iy]], np.float32)
-    holed = np.where(g.mask > 0, g.heights, np.float32(np.nan))
+    cells, mean_aerial = filled_cells(aerial.heights, *lattice_index(aerial))
+    pairs, mean_ground = paired(ground.heights)
     poses = np.array(poses, np.float64)
-    poses[:, :2] = poses[:, :2] * ground.cells_per_m - lattice_index(ground) + 2
-    sums = sums_at_poses(cells, holed, poses)
-    return Overlays(sums, a.mean, g.mean, aerial.filled_cells)
+    poses[:, :2] = poses[:, :2] * ground.cells_per_m - lattice_index(ground) + MARGIN
+    sums = sums_at_poses(cells, pairs, poses)
+    return Overlays(sums, mean_aerial, mean_ground, cells.shape[1])
 
 
 def _window(heights: NDArray[np.float32], start: NDArray, extent: NDArray) -> NDArray[np.float32]:

@@ -4,10 +4,20 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import fft
 
 from airground.config import Localization
 from airground.core.belief import HeightMap
-from airground.localization.cost_map import compute_cost_map, masked, overlay_at, overlay_turned
+from airground.core.height_map import lattice_index
+from airground.localization.cost_map import (
+    OffsetSearch,
+    compute_cost_map,
+    masked,
+    overlay_at,
+    overlay_turned,
+    reach_of,
+)
+from airground.localization.turned_kernels import MARGIN, filled_cells, paired
 from tests.localization import naive
 
 CELLS_PER_M = 10.0
@@ -158,3 +168,58 @@ def test_heights_about_their_mean_are_those_of_arrays() -> None:
     assert empty.mean == 0
     assert not empty.heights.any()
     assert not empty.mask.any()
+
+
+@pytest.mark.kernel
+def test_filled_cells_are_those_of_arrays() -> None:
+    heights = random_map(np.random.default_rng(1), (7, 5), (0, 0)).heights
+    cells, mean = filled_cells(heights, -3, 4)
+    filled = np.isfinite(heights)
+    assert 0 < filled.sum() < filled.size
+    assert mean == pytest.approx(np.nanmean(heights, dtype=np.float64), abs=1e-12)
+    assert np.array_equal(cells[:2].T, np.argwhere(filled) + np.array([-3, 4]))
+    assert np.array_equal(cells[2], heights[filled] - np.float32(mean))
+    assert filled_cells(np.full((2, 3), np.nan, np.float32), 0, 0)[0].shape == (3, 0)
+
+
+@pytest.mark.kernel
+def test_pairs_hold_each_height_with_the_next_of_its_row() -> None:
+    heights = random_map(np.random.default_rng(2), (6, 9), (0, 0)).heights
+    pairs, mean = paired(heights)
+    centred = np.pad(heights - np.float32(mean), MARGIN, constant_values=np.nan)
+    following = np.pad(centred[:, 1:], ((0, 0), (0, 1)), constant_values=np.nan)
+    assert np.isnan(heights).any()
+    np.testing.assert_array_equal(pairs, np.stack([centred, following], axis=2))
+
+
+def test_transforms_of_filled_rows_alone_are_the_whole_ones() -> None:
+    """What is not computed is zero before, or no offset after: the same bits otherwise."""
+    rng = np.random.default_rng(3)
+    aerial, ground = random_map(rng, (14, 11), (-6, -4)), random_map(rng, (26, 30), (-12, -13))
+    search = OffsetSearch(ground, (0.1, -0.2), 1.0, reach_of(aerial))
+    size = search._fft_shape
+    a, g = masked(aerial.heights), masked(under_offsets(ground, search, aerial))
+    pairs = [
+        (a.mask, g.mask),
+        (a.heights, g.mask),
+        (a.mask, g.heights),
+        (a.heights**2, g.mask),
+        (a.mask, g.heights**2),
+        (a.heights, g.heights),
+    ]
+    nx, ny = search.shape
+    found = search.sums(aerial)
+    for index, (over, under) in enumerate(pairs):
+        product = fft.rfft2(over, size).conj() * fft.rfft2(under, size)
+        expected = fft.irfft2(product, size)[:nx, :ny]
+        if index == 0:
+            expected = np.rint(expected)
+        np.testing.assert_array_equal(found[..., index], expected)
+
+
+def under_offsets(ground: HeightMap, search: OffsetSearch, aerial: HeightMap) -> np.ndarray:
+    """The ground heights that some offset lays the aerial map over, NaN outside the map."""
+    padded = np.pad(ground.heights, 40, constant_values=np.nan)
+    low = search.first + reach_of(aerial)[0] - lattice_index(ground) + 40
+    high = low + search.shape + aerial.heights.shape - np.array(1)
+    return padded[low[0] : high[0], low[1] : high[1]]

@@ -1,0 +1,186 @@
+"""Sums over the overlap of a turned aerial height map with the ground's (see `cost_kernels`).
+
+Turned, each aerial cell falls between four others of the ground map. Looking these up takes
+most of the time, so neighbours along a row lie in memory as pairs, and one load brings two.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+from airground.localization.cost_kernels import KEEPS_NAN
+
+BLOCK = 512
+"""Cells that are placed, looked up and added up at a time, so that they stay in the cache."""
+MARGIN = 2
+"""Empty cells around paired heights: a place outside is moved there, where nothing counts."""
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def filled_cells(
+    heights: NDArray[np.float32], first_x: int, first_y: int
+) -> tuple[NDArray[np.float32], float]:
+    """The filled cells of an aerial map (3, K): x, y [cells], height about the mean; the mean.
+
+    Args:
+        heights: (nx, ny) [m], NaN in holes.
+        first_x, first_y: Of cell [0, 0], from the camera [cells].
+    """
+    mean, count = _mean(heights)
+    cells = np.empty((3, count), np.float32)
+    k = 0
+    for i in range(heights.shape[0]):
+        for j in range(heights.shape[1]):
+            if heights[i, j] == heights[i, j]:
+                cells[0, k], cells[1, k] = i + first_x, j + first_y
+                cells[2, k] = heights[i, j] - np.float32(mean)
+                k += 1
+    return cells, mean
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def paired(heights: NDArray[np.float32]) -> tuple[NDArray[np.float32], float]:
+    """Ground heights about their mean (nx + 4, ny + 4, 2), each with the next of its row; the mean.
+
+    Args:
+        heights: (nx, ny) [m], NaN in holes.
+
+    Returns:
+        NaN in holes and in `MARGIN` cells around; and the mean [m].
+    """
+    mean, _ = _mean(heights)
+    nx, ny = heights.shape
+    pairs = np.full((nx + 2 * MARGIN, ny + 2 * MARGIN, 2), np.float32(np.nan), np.float32)
+    for i in range(nx):
+        row, line = heights[i], pairs[i + MARGIN].ravel()
+        for j in range(ny):
+            # As the second of one pair and the first of the next, which lie side by side.
+            at = 2 * (j + MARGIN)
+            line[at - 1] = line[at] = row[j] - np.float32(mean)
+    return pairs, mean
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=KEEPS_NAN)
+def _mean(heights: NDArray[np.float32]) -> tuple[float, int]:
+    """Mean (0 of none) and number of the heights that are not NaN."""
+    total, count = 0.0, 0
+    for height in heights.ravel():
+        total += np.float64(height) if height == height else 0.0
+        count += 1 if height == height else 0
+    return total / max(count, 1), count
+
+
+@njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=KEEPS_NAN)
+def sums_at_poses(
+    cells: NDArray[np.float32], pairs: NDArray[np.float32], poses: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The six sums (M, 6) for M poses of a turned aerial map.
+
+    Args:
+        cells: (3, K) as `filled_cells` returns them.
+        pairs: (rows, columns, 2) as `paired` returns them.
+        poses: (M, 3) index of the camera in `pairs` [cells], and heading [rad].
+    """
+    sums = np.zeros((len(poses), 6))
+    rows, columns, _ = pairs.shape
+    # A pair of float32 travels as one number of 8 bytes.
+    packed = pairs.reshape(2 * rows * columns).view(np.float64)
+    last = np.float32(rows - 2), np.float32(columns - 2)
+    for p in prange(len(poses)):
+        place = np.float32(poses[p, 0]), np.float32(poses[p, 1])
+        turn = np.float32(np.cos(poses[p, 2])), np.float32(np.sin(poses[p, 2]))
+        index = np.empty(BLOCK, np.uint32)
+        fractions = np.empty((2, BLOCK), np.float32)
+        corners = np.empty(2 * BLOCK, np.float64)
+        for begin in range(0, cells.shape[1], BLOCK):
+            n = min(BLOCK, cells.shape[1] - begin)
+            # One-dimensional slices: only these are known to be contiguous.
+            x, y = cells[0, begin : begin + n], cells[1, begin : begin + n]
+            _place_cells(x, y, place, turn, last, columns, index, fractions[0], fractions[1])
+            _look_up(packed, columns, index, n, corners)
+            _add_cells(
+                cells[2, begin : begin + n],
+                fractions[0],
+                fractions[1],
+                corners.view(np.float32),
+                sums[p],
+            )
+    return sums
+
+
+@njit(cache=True, error_model="numpy", fastmath=KEEPS_NAN)
+def _place_cells(
+    cell_x: NDArray,
+    cell_y: NDArray,
+    place: tuple[np.float32, np.float32],
+    turn: tuple[np.float32, np.float32],
+    last: tuple[np.float32, np.float32],
+    columns: int,
+    index: NDArray,
+    fraction_x: NDArray,
+    fraction_y: NDArray,
+) -> None:
+    """Where cells fall in the ground map: flat index of the corner before, and the rest."""
+    (x0, y0), (c, s), (last_x, last_y) = place, turn, last
+    zero, stride = np.float32(0), np.int32(columns)
+    for i in range(len(cell_x)):
+        # Clamped to the empty edge, where nothing counts.
+        x = min(max(x0 + c * cell_x[i] - s * cell_y[i], zero), last_x)
+        y = min(max(y0 + s * cell_x[i] + c * cell_y[i], zero), last_y)
+        ix, iy = np.int32(x), np.int32(y)
+        fraction_x[i], fraction_y[i] = x - np.float32(ix), y - np.float32(iy)
+        index[i] = np.uint32(np.int32(ix * stride) + iy)
+
+
+@njit(cache=True, error_model="numpy")
+def _look_up(packed: NDArray, columns: int, index: NDArray, n: int, corners: NDArray) -> None:
+    """The pairs of heights before and behind each of n places."""
+    below = packed[columns:]
+    for i in range(n):
+        corners[2 * i], corners[2 * i + 1] = packed[index[i]], below[index[i]]
+
+
+@njit(cache=True, error_model="numpy", fastmath=KEEPS_NAN)
+def _add_cells(
+    aerial: NDArray,
+    fraction_x: NDArray,
+    fraction_y: NDArray,
+    corners: NDArray,
+    sums: NDArray,
+) -> None:
+    """Add cells to the sums, given their fractions and the ground at their four corners."""
+    zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
+    n, sum_a, sum_g, sum_aa, sum_gg, sum_ag = zero, zero, zero, zero, zero, zero
+    for i in range(len(aerial)):
+        wx, wy = fraction_x[i], fraction_y[i]
+        g00, g01 = corners[4 * i], corners[4 * i + 1]
+        g10, g11 = corners[4 * i + 2], corners[4 * i + 3]
+        w11 = wx * wy
+        w10, w01 = wx - w11, wy - w11
+        w00 = one - wx - w01
+        w00 = w00 if g00 == g00 else zero
+        w01 = w01 if g01 == g01 else zero
+        w10 = w10 if g10 == g10 else zero
+        w11 = w11 if g11 == g11 else zero
+        weight = w00 + w01 + w10 + w11
+        height = w00 * (g00 if g00 == g00 else zero)
+        height += w01 * (g01 if g01 == g01 else zero)
+        height += w10 * (g10 if g10 == g10 else zero)
+        height += w11 * (g11 if g11 == g11 else zero)
+        valid = one if weight >= half else zero
+        g = height / weight if weight >= half else zero
+        a = valid * aerial[i]
+        n += valid
+        sum_a += a
+        sum_g += g
+        sum_aa += a * a
+        sum_gg += g * g
+        sum_ag += a * g
+    sums[0] += n
+    sums[1] += sum_a
+    sums[2] += sum_g
+    sums[3] += sum_aa
+    sums[4] += sum_gg
+    sums[5] += sum_ag
