@@ -19,6 +19,11 @@ from airground.dense.workspace import Workspace
 FAST = {"contract", "reassoc", "arcp", "nsz"}
 STRIPS = 16
 """Columns are shared out in this many strips for the vertical directions."""
+ROWS_AT_A_TIME = 8
+"""Rows whose paths are extended in turns: what a path's next pixel needs of the pixel before
+has then left the processor's store buffer, for which it would wait otherwise."""
+_UNREACHABLE = np.uint16(30000)
+"""Stands beside the first and the last plane."""
 
 
 def smooth(
@@ -41,87 +46,118 @@ def smooth(
     """
     total = workspace.take(mean.shape)
     step = int(MEAN_SCALE * parameters.step_penalty)
-    jump, edge = MEAN_SCALE * parameters.jump_penalty, parameters.edge_levels
-    along_rows(mean, reference, step, jump, edge, total)
-    along_columns(mean, reference, step, jump, edge, total)
+    jump = MEAN_SCALE * parameters.jump_penalty
+    across, down = np.empty((2, *reference.shape), np.uint16)
+    jump_penalties(reference, step, jump, parameters.edge_levels, across, down)
+    along_rows(mean, across, step, total)
+    along_columns(mean, down, step, total)
     return total
 
 
-@njit(cache=True, error_model="numpy", fastmath=FAST)
-def _extend(
-    cost: NDArray, before: NDArray, after: NDArray, total: NDArray, step: int, jump: int
+@njit(cache=True, parallel=True, nogil=True, error_model="numpy")
+def jump_penalties(
+    image: NDArray, step: int, jump: float, edge: float, across: NDArray, down: NDArray
 ) -> None:
-    """One pixel of one path; `before` and `after` have one guard at either end."""
-    planes = len(cost)
-    lowest = np.uint16(65535)
-    middle = before[1 : planes + 1]
-    for p in range(planes):
-        lowest = min(lowest, middle[p])
-    near, far, out = before[:planes], before[2 : planes + 2], after[1 : planes + 1]
+    """Fills (height, width) `across` and `down`: between a pixel and the one left of or above it.
+
+    The jump penalty is lower across an edge of the image, and never below `step`.
+    """
+    height, width = image.shape
+    for y in prange(height):
+        for x in range(width):
+            left, above = image[y, max(x - 1, 0)], image[max(y - 1, 0), x]
+            across[y, x] = max(int(jump / (1.0 + abs(image[y, x] - left) / edge)), step)
+            down[y, x] = max(int(jump / (1.0 + abs(image[y, x] - above) / edge)), step)
+
+
+@njit(cache=True, inline="always", error_model="numpy")
+def _extend(
+    cost: NDArray,
+    before: NDArray,
+    after: NDArray,
+    total: NDArray,
+    lowest: int,
+    step: int,
+    jump: int,
+) -> int:
+    """One pixel of one path; `before` and `after` have one guard at either end.
+
+    Args:
+        cost: (planes,) uint16 of the pixel.
+        before, after: (planes + 2,) uint16 path costs at the last pixel, and here, filled.
+        total: (planes,) uint16, the path costs are added to.
+        lowest: The lowest of `before`.
+        step, jump: Penalties.
+
+    Returns:
+        The lowest of `after`.
+    """
     small, cap = np.uint16(step), np.uint16(lowest + np.uint16(jump))
-    for p in range(planes):
-        moved = np.uint16(min(near[p], far[p]) + small)
-        path = np.uint16(np.uint16(min(min(middle[p], cap), moved) - lowest) + cost[p])
-        out[p] = path
+    lowest_here = np.uint16(65535)
+    for p in range(len(cost)):
+        moved = np.uint16(min(before[p], before[p + 2]) + small)
+        path = np.uint16(np.uint16(min(min(before[p + 1], cap), moved) - lowest) + cost[p])
+        after[p + 1] = path
         total[p] = np.uint16(total[p] + path)
-
-
-@njit(cache=True, error_model="numpy")
-def _jump(step: int, jump: float, edge: float, here: float, before: float) -> int:
-    """The jump penalty between two neighbours, lower across an edge of the image."""
-    return max(int(jump / (1.0 + abs(here - before) / edge)), step)
+        lowest_here = min(lowest_here, path)
+    return lowest_here
 
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
-def along_rows(
-    mean: NDArray, image: NDArray, step: int, jump: float, edge: float, total: NDArray
-) -> None:
+def along_rows(mean: NDArray, across: NDArray, step: int, total: NDArray) -> None:
     """The sum of the paths from the left and from the right."""
     height, width, planes = mean.shape
-    for y in prange(height):
-        total[y] = np.uint16(0)
-        paths = np.empty((2, planes + 2), np.uint16)
+    for task in prange((height + ROWS_AT_A_TIME - 1) // ROWS_AT_A_TIME):
+        begin = task * ROWS_AT_A_TIME
+        rows = min(ROWS_AT_A_TIME, height - begin)
+        total[begin : begin + rows] = np.uint16(0)
+        paths = np.empty((2, rows, planes + 2), np.uint16)
+        lowest = np.empty(rows, np.uint16)
         for direction in range(2):
-            paths[:] = np.uint16(30000)
-            paths[0, 1 : planes + 1] = 0
+            paths[:] = _UNREACHABLE
+            paths[0, :, 1 : planes + 1] = 0
+            lowest[:] = 0
             for i in range(width):
                 x = i if direction == 0 else width - 1 - i
-                last = x if i == 0 else (x - 1 if direction == 0 else x + 1)
-                penalty = _jump(step, jump, edge, image[y, x], image[y, last])
-                _extend(
-                    mean[y, x],
-                    paths[i & 1],
-                    paths[(i + 1) & 1],
-                    total[y, x],
-                    step,
-                    penalty,
-                )
+                # The penalty lies between x and the pixel before it on the path.
+                link = x if direction == 0 else min(x + 1, width - 1)
+                for row in range(rows):
+                    y = begin + row
+                    lowest[row] = _extend(
+                        mean[y, x],
+                        paths[i & 1, row],
+                        paths[(i + 1) & 1, row],
+                        total[y, x],
+                        lowest[row],
+                        step,
+                        across[y, link],
+                    )
 
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
-def along_columns(
-    mean: NDArray, image: NDArray, step: int, jump: float, edge: float, total: NDArray
-) -> None:
+def along_columns(mean: NDArray, down: NDArray, step: int, total: NDArray) -> None:
     """Adds the paths from the top and from the bottom."""
     height, width, planes = mean.shape
     for strip in prange(STRIPS):
         begin = strip * width // STRIPS
         columns = (strip + 1) * width // STRIPS - begin
         paths = np.empty((2, columns, planes + 2), np.uint16)
+        lowest = np.empty(columns, np.uint16)
         for direction in range(2):
-            paths[:] = np.uint16(30000)
+            paths[:] = _UNREACHABLE
             paths[0, :, 1 : planes + 1] = 0
+            lowest[:] = 0
             for i in range(height):
                 y = i if direction == 0 else height - 1 - i
-                last = y if i == 0 else (y - 1 if direction == 0 else y + 1)
-                for c in range(columns):
-                    x = begin + c
-                    penalty = _jump(step, jump, edge, image[y, x], image[last, x])
-                    _extend(
+                link = y if direction == 0 else min(y + 1, height - 1)
+                for column in range(columns):
+                    x = begin + column
+                    lowest[column] = _extend(
                         mean[y, x],
-                        paths[i & 1, c],
-                        paths[(i + 1) & 1, c],
+                        paths[i & 1, column],
+                        paths[(i + 1) & 1, column],
                         total[y, x],
+                        lowest[column],
                         step,
-                        penalty,
+                        down[link, x],
                     )
