@@ -142,6 +142,9 @@ class GroundMapping(Section):
     """A frame joins the map once the camera moved this far [m] ..."""
     keyframe_angle_deg: Positive = 3.0
     """... or turned this far [deg]."""
+    keyframes_a_view: Count = 2
+    """No more than this many keyframes are as near to each other as that, however often the
+    robot comes back, so that the map grows with what was seen and not with time."""
     max_depth_m: Positive = 4.0
     """Depth beyond this is too noisy to keep [m]."""
     voxel_m: Positive = 0.02

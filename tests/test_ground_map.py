@@ -89,6 +89,23 @@ def test_keyframes_follow_motion() -> None:
     assert ground_map.wants(SE3.from_heading(np.deg2rad(5.1)))
 
 
+def test_coming_back_adds_no_keyframes_without_end() -> None:
+    """Back and forth along a line: the first laps add keyframes, the others none."""
+    bounds = GroundMapping(keyframe_distance_m=0.1, keyframe_angle_deg=5, keyframes_a_view=2)
+    ground_map = GroundMap(CAMERA, bounds)
+    image = wall_image(2.0)
+    counts = []
+    for _ in range(5):
+        for x in [*np.arange(0, 1, 0.05), *np.arange(1, 0, -0.05)]:
+            pose = SE3.from_heading(0.0, [x, 0, 0])
+            if ground_map.wants(pose):
+                ground_map.add(image, pose)
+        counts.append(ground_map.keyframes)
+    assert counts[0] >= 11
+    assert counts[1] == counts[4]
+    assert ground_map.wants(SE3.from_heading(np.deg2rad(8), [0.5, 0, 0]))  # another view
+
+
 def path(offset: float = 0.0, turn_deg: float = 0.0) -> list[SE3]:
     """Three poses before a wall; those after the first are off by `offset` along y."""
     return [

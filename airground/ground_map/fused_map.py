@@ -50,15 +50,21 @@ class GroundMap:
         return len(self._keyframes)
 
     def wants(self, T_ground_camera: SE3) -> bool:
-        """Whether the camera moved or turned enough since the last keyframe."""
+        """Whether the camera moved or turned enough since the last keyframe, to a rare view."""
         if not self._keyframes:
             return True
-        return _moved(
-            self._keyframes[-1].T_ground_camera,
-            T_ground_camera,
-            self._config.keyframe_distance_m,
-            self._config.keyframe_angle_deg,
-        )
+        if self._is_near(self._keyframes[-1], T_ground_camera):
+            return False
+        places = np.array([keyframe.T_ground_camera.translation for keyframe in self._keyframes])
+        apart = np.linalg.norm(places - T_ground_camera.translation, axis=1)
+        here = np.flatnonzero(apart < self._config.keyframe_distance_m)
+        alike = sum(self._is_near(self._keyframes[index], T_ground_camera) for index in here)
+        return alike < self._config.keyframes_a_view
+
+    def _is_near(self, keyframe: GroundKeyframe, T_ground_camera: SE3) -> bool:
+        """Whether a camera there would see what the keyframe does."""
+        distance, angle = self._config.keyframe_distance_m, self._config.keyframe_angle_deg
+        return not _moved(keyframe.T_ground_camera, T_ground_camera, distance, angle)
 
     def add(self, image: GroundImage, T_ground_camera: SE3) -> None:
         """Take in a keyframe."""
