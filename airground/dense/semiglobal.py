@@ -76,10 +76,10 @@ def _extend(
     before: NDArray,
     after: NDArray,
     total: NDArray,
-    lowest: int,
+    lowest: np.uint16,
     step: int,
-    jump: int,
-) -> int:
+    jump: np.uint16,
+) -> np.uint16:
     """One pixel of one path; `before` and `after` have one guard at either end.
 
     Args:
@@ -92,7 +92,7 @@ def _extend(
     Returns:
         The lowest of `after`.
     """
-    small, cap = np.uint16(step), np.uint16(lowest + np.uint16(jump))
+    small, cap = np.uint16(step), np.uint16(lowest + jump)
     lowest_here = np.uint16(65535)
     for p in range(len(cost)):
         moved = np.uint16(min(before[p], before[p + 2]) + small)
