@@ -91,6 +91,15 @@ def test_refuses_what_is_no_rigid_motion() -> None:
         SE3(np.eye(3), np.zeros(2))
 
 
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("place", range(12))
+def test_no_number_of_a_pose_may_be_infinite_or_missing(place: int, value: float) -> None:
+    numbers = np.concatenate([np.eye(3).ravel(), np.zeros(3)])
+    numbers[place] = value
+    with pytest.raises(ValueError, match="not finite"):
+        SE3(numbers[:9].reshape(3, 3), numbers[9:])
+
+
 def test_is_read_only() -> None:
     pose = SE3.identity()
     with pytest.raises(ValueError, match="read-only"):
