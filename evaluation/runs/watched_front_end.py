@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
 
 from airground.core.messages import GroundImage, ImuSamples, MavImage
@@ -19,7 +19,7 @@ class FrontEndLog:
     """What a front end said.
 
     Attributes:
-        answers: One an image, in order of time.
+        answers: One an image, in order of time, without corners.
         durations_ms: Of each image with the inertial samples before it, mapping included,
             decoding not.
     """
@@ -63,7 +63,8 @@ class WatchedFrontEnd(FrontEndLog, Generic[Image]):
         answer = self._inner.track(image)
         self.durations_ms.append(1e3 * (time.perf_counter() - started + self._imu_s))
         self._imu_s = 0.0
-        self.answers.append(answer)
+        # Corners are for who looks on meanwhile; of a long recording they would fill memory.
+        self.answers.append(replace(answer, corners=None))
         return answer
 
     def finish(self) -> None:

@@ -1,0 +1,39 @@
+"""What is kept of a front end's answers while a recording is run."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from airground.core.messages import ImuSamples, MavImage
+from airground.core.se3 import SE3
+from airground.core.trajectory import Trajectory
+from airground.slam.front_end import TrackedCorners, TrackedPose, Tracking
+from evaluation.runs.watched_front_end import WatchedFrontEnd
+
+CORNERS = TrackedCorners(np.zeros((3, 2), np.float32), np.array([True, False, True]))
+
+
+class Standing:
+    """A front end that is always at the same place, and follows three corners."""
+
+    def add_imu(self, samples: ImuSamples) -> None:
+        """Nothing to learn from them."""
+
+    def track(self, image: MavImage) -> TrackedPose:
+        return TrackedPose(image.stamp_ns, Tracking.TRACKED, SE3.identity(), corners=CORNERS)
+
+    def finish(self) -> None:
+        """Nothing was put off."""
+
+    def trajectory(self) -> Trajectory | None:
+        return None
+
+
+def test_corners_are_passed_on_and_not_kept() -> None:
+    """They are most of an answer's bytes, and a long recording has many answers."""
+    watched: WatchedFrontEnd[MavImage] = WatchedFrontEnd(Standing())
+    said = watched.track(MavImage(5, np.zeros((4, 4), np.uint8)))
+    assert said.corners is CORNERS
+    (kept,) = watched.log().answers
+    assert kept.corners is None
+    assert (kept.stamp_ns, kept.T_map_camera) == (said.stamp_ns, said.T_map_camera)
