@@ -15,11 +15,13 @@ from airground.io import layout
 from airground.io.calibration import CalibrationTable, RobotTable
 from airground.io.digests import bytes_digest
 from airground.io.recording_writer import ground_image_name, mav_image_name
+from sim.edges import Edges
 from sim.motion import ROBOTS, Motion, Robot
 from sim.presets import SensorPreset
 from sim.render import Renderer
 from sim.sensors.camera import ImageSensor
 from sim.sensors.depth import kinect_depth
+from sim.smooth_edges import smooth_edges
 
 # Noise does not compress: the fastest settings, half the time of the default ones.
 PNG_SETTINGS = [
@@ -40,6 +42,7 @@ class FramePlan:
     Attributes:
         recording: The folder that images are written into.
         model: File of the compiled world with both cameras.
+        edges: File of its edges.
         motion: File of both robots' motion.
         true: How the sensors are.
         preset: The faults of images and depth.
@@ -49,6 +52,7 @@ class FramePlan:
 
     recording: Path
     model: Path
+    edges: Path
     motion: Path
     true: CalibrationTable
     preset: SensorPreset
@@ -74,6 +78,7 @@ class FrameMaker:
     def __init__(self, plan: FramePlan) -> None:
         self._plan = plan
         self._motion = Motion.load(plan.motion)
+        self._edges = Edges.load(plan.edges)
         self._renderer = Renderer(mujoco.MjModel.from_binary_path(str(plan.model)))
         self._sensors: dict[Robot, ImageSensor] = {}
         if plan.preset.image is not None:
@@ -104,8 +109,9 @@ class FrameMaker:
         """(height, width) grey image of the MAV."""
         time_ns, rng = self._start("mav", index)
         T_world_camera = self._motion.camera_pose("mav", time_ns)
-        colour, depth = self._renderer.colour_and_rough_depth("mav", T_world_camera)
+        colour, depth = self._renderer.draw("mav", T_world_camera)
         grey = cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY)[..., None]
+        grey = self._smooth("mav", grey, depth, T_world_camera)
         if "mav" in self._sensors:
             grey = self._expose("mav", grey, depth, time_ns, rng)
         return np.asarray(grey[..., 0], np.uint8)
@@ -114,8 +120,8 @@ class FrameMaker:
         """(height, width, 3) RGB and (height, width) depth as PNG values, of the ground robot."""
         time_ns, rng = self._start("ground", index)
         T_world_camera = self._motion.camera_pose("ground", time_ns)
-        colour = self._renderer.colour("ground", T_world_camera)
-        depth = self._renderer.depth("ground", T_world_camera)
+        colour, depth = self._renderer.draw("ground", T_world_camera)
+        colour = self._smooth("ground", colour, depth, T_world_camera)
         if "ground" in self._sensors:
             colour = self._expose("ground", colour, depth, time_ns, rng)
         if self._plan.preset.depth is not None:
@@ -130,6 +136,12 @@ class FrameMaker:
         # takes [a] and [a, 0] as the same seed.
         rng = np.random.default_rng([*self._plan.seeds, ROBOTS.index(robot) + 1, index + 1])
         return stamp + self._table(robot).camera.time_offset_ns, rng
+
+    def _smooth(
+        self, robot: Robot, picture: NDArray, depth: NDArray, T_world_camera: SE3
+    ) -> NDArray[np.uint8]:
+        camera = self._table(robot).camera.pinhole()
+        return smooth_edges(picture, depth, camera, T_world_camera, self._edges)
 
     def _expose(
         self, robot: Robot, sharp: NDArray, depth: NDArray, time_ns: int, rng: np.random.Generator

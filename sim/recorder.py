@@ -20,6 +20,7 @@ from airground.errors import AirgroundError, InputError
 from airground.io import recording_writer
 from airground.io.calibration import CalibrationTable
 from airground.io.header import FrameCounts, Header
+from sim.edges import find_edges
 from sim.frame_pool import make_frames
 from sim.frames import FramePlan
 from sim.motion import RATE_HZ, Motion, Robot, simulate_motion
@@ -111,6 +112,7 @@ def _fill(
         store_model(plan, scene, seed)
     digests = _render(plan, workers, console)
     plan.model.unlink()
+    plan.edges.unlink()
     recording_writer.finish(root, header, digests)
 
 
@@ -154,6 +156,7 @@ def write_all_but_images(
     plan = FramePlan(
         recording=root,
         model=root / "world.mjb",
+        edges=root / "edges.npz",
         motion=root / "truth/motion.npz",
         true=sensors.true,
         preset=preset,
@@ -173,6 +176,7 @@ def store_model(plan: FramePlan, scene: Scene, seed: int) -> None:
     if shutil.disk_usage(plan.recording).free < mujoco.mj_sizeModel(model):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     mujoco.mj_saveModel(model, str(plan.model), None)
+    find_edges((world.vertices, world.triangles), world.terrain).save(plan.edges)
 
 
 def image_stamps(motion_stamps_ns: NDArray[np.int64], first_ns: int) -> NDArray[np.int64]:

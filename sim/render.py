@@ -61,38 +61,22 @@ class Renderer:
         self._context.free()
         self._window.free()
 
-    def colour(self, camera: str, T_world_camera: SE3) -> NDArray[np.uint8]:
-        """(height, width, 3) uint8 RGB, antialiased."""
-        rect = self._draw(camera, T_world_camera)
-        image = np.empty((rect.height, rect.width, 3), np.uint8)
-        mujoco.mjr_readPixels(image, None, rect, self._context)
-        return np.ascontiguousarray(image[::-1])
-
-    def colour_and_rough_depth(
+    def draw(
         self, camera: str, T_world_camera: SE3
     ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
-        """`colour`, and in the same drawing depth of some place within each pixel."""
-        rect = self._draw(camera, T_world_camera)
-        image = np.empty((rect.height, rect.width, 3), np.uint8)
-        stored = np.empty((rect.height, rect.width), np.float32)
-        mujoco.mjr_readPixels(image, stored, rect, self._context)
-        return np.ascontiguousarray(image[::-1]), self._metric(stored[::-1])
+        """What is seen at the pixels' centres.
 
-    def depth(self, camera: str, T_world_camera: SE3) -> NDArray[np.float32]:
-        """(height, width) float32 [m] along the optical axis, NaN where there is nothing.
-
-        Drawn without antialiasing, which would move the samples off the pixel centres.
+        Returns:
+            (height, width, 3) uint8 RGB, textures filtered and edges not (`smooth_edges` does
+            that); and (height, width) float32 depth [m], NaN where there is nothing.
         """
-        flags = self._scene.flags.copy()
-        self._scene.flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = True
-        self._scene.flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = True
-        rect = self._draw(camera, T_world_camera)
-        self._scene.flags[:] = flags
+        rect = self._render(camera, T_world_camera)
+        picture = np.empty((rect.height, rect.width, 3), np.uint8)
         stored = np.empty((rect.height, rect.width), np.float32)
-        mujoco.mjr_readPixels(None, stored, rect, self._context)
-        return self._metric(stored[::-1])
+        mujoco.mjr_readPixels(picture, stored, rect, self._context)
+        return np.ascontiguousarray(picture[::-1]), self._metric(stored[::-1])
 
-    def _draw(self, camera: str, T_world_camera: SE3) -> mujoco.MjrRect:
+    def _render(self, camera: str, T_world_camera: SE3) -> mujoco.MjrRect:
         index = self._model.camera(camera).id
         self._data.cam_xpos[index] = T_world_camera.translation
         self._data.cam_xmat[index] = (T_world_camera.rotation @ _OPENCV_FROM_OPENGL).ravel()
@@ -136,7 +120,10 @@ def _open_window(width: int, height: int) -> mujoco.GLContext:
 
 
 def with_cameras(spec: mujoco.MjSpec, cameras: Mapping[str, PinholeCamera]) -> mujoco.MjModel:
-    """Compile a world (left as it is) with cameras of exact intrinsics, by name."""
+    """Compile a world (left as it is) with cameras of exact intrinsics, by name.
+
+    It is drawn with one sample a pixel, which lies in the pixel's centre.
+    """
     spec = spec.copy()
     for name, camera in cameras.items():
         spec.worldbody.add_camera(
@@ -149,7 +136,9 @@ def with_cameras(spec: mujoco.MjSpec, cameras: Mapping[str, PinholeCamera]) -> m
                 camera.height / 2 - 0.5 - camera.cy,
             ],
         )
-    visual = spec.visual.global_
-    visual.offwidth = max(visual.offwidth, *(c.width for c in cameras.values()))
-    visual.offheight = max(visual.offheight, *(c.height for c in cameras.values()))
+    # No pixel is cleared that nobody sees, and no box has more triangles than it needs.
+    visual, quality = spec.visual.global_, spec.visual.quality
+    visual.offwidth = max(c.width for c in cameras.values())
+    visual.offheight = max(c.height for c in cameras.values())
+    quality.offsamples, quality.numquads = 0, 1
     return spec.compile()

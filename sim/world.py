@@ -27,7 +27,6 @@ _CONCRETE = (0.32, 0.31, 0.29)
 _CARDBOARD = (0.42, 0.28, 0.15)
 _SOIL = (0.26, 0.19, 0.12)
 _STONE = (0.28, 0.26, 0.24)
-OFFSCREEN_PX = (1280, 960)
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +129,6 @@ def _empty_spec(lit: bool) -> mujoco.MjSpec:
         width=64,
         height=384,
     )
-    spec.visual.global_.offwidth, spec.visual.global_.offheight = OFFSCREEN_PX
     spec.visual.map.znear = 0.005
     spec.visual.map.zfar = 20
     spec.stat.extent = 5.0

@@ -53,7 +53,6 @@ def empty_spec() -> mujoco.MjSpec:
     spec = mujoco.MjSpec()
     spec.visual.map.znear, spec.visual.map.zfar = 0.005, 20.0
     spec.stat.extent, spec.stat.center = 5.0, [0, 0, 0.5]
-    spec.visual.quality.offsamples = 4
     spec.visual.quality.shadowsize = 0
     return spec
 

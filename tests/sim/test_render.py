@@ -20,7 +20,7 @@ def heap() -> Heap:
 @pytest.fixture(scope="module")
 def depths(heap: Heap) -> dict[str, np.ndarray]:
     with Renderer(with_cameras(heap.spec, CAMERAS)) as renderer:
-        return {name: renderer.depth(name, POSES[name]) for name in CAMERAS}
+        return {name: renderer.draw(name, POSES[name])[1] for name in CAMERAS}
 
 
 def assert_same_depth(one: np.ndarray, other: np.ndarray) -> None:
@@ -92,7 +92,8 @@ def test_markers_land_on_their_predicted_pixels() -> None:
             type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[radius, 0, 0], pos=centre, rgba=[1, 1, 1, 1]
         )
     with Renderer(with_cameras(spec, {"mav": camera})) as renderer:
-        light = renderer.colour("mav", T_world_camera).astype(float).mean(axis=2)
+        picture, _ = renderer.draw("mav", T_world_camera)
+    light = picture.astype(float).mean(axis=2)
     light -= np.median(light)
     for pixel in pixels:
         column, row = np.rint(pixel).astype(int)
@@ -111,15 +112,8 @@ def test_nothing_is_nan_and_the_world_is_left_alone() -> None:
     camera = PinholeCamera(65, 49, 50.0, 50.0, 32.0, 24.0)
     T_world_camera = SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 2.0]))
     with Renderer(with_cameras(spec, {"small": camera})) as renderer:
-        depth = renderer.depth("small", T_world_camera)
+        _, depth = renderer.draw("small", T_world_camera)
     assert depth.shape == (49, 65)
     assert np.isnan(depth[0, 0])
     assert depth[24, 32] == pytest.approx(1.8, abs=1e-5)
     assert len(spec.cameras) == 0
-
-
-def test_rough_depth_is_within_a_pixel(heap: Heap, depths: dict) -> None:
-    with Renderer(with_cameras(heap.spec, CAMERAS)) as renderer:
-        colour, rough = renderer.colour_and_rough_depth("mav", POSES["mav"])
-        np.testing.assert_array_equal(colour, renderer.colour("mav", POSES["mav"]))
-    assert np.median(np.abs(rough - depths["mav"])) < 2e-3
