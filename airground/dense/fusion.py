@@ -19,6 +19,8 @@ STEP = 12.0**-0.5
 """Primal and dual step; the squared norm of the 3-d gradient is at most 12."""
 BLOCK_ROWS = 16
 """Rows that one thread takes at a time; fixed, so that the number of threads changes nothing."""
+AT_ONCE = 2
+"""Iterations in one pass through memory; at most half of `BLOCK_ROWS`."""
 UNSEEN = -1.0
 """Where no depth map sees anything, phi starts behind the surface."""
 
@@ -45,8 +47,11 @@ class Fusion:
             self._memory = np.empty((5, *counts.shape), np.float32)
         phi, ahead, dy, dk, dx = self._memory
         start(counts, self.spacing, phi, ahead, dy, dk, dx)
-        for _ in range(self.iterations):
-            iterate(counts, self.spacing, phi, ahead, dy, dk, dx, STEP, STEP * self.data_weight)
+        for done in range(0, self.iterations, AT_ONCE):
+            iterate(
+                min(AT_ONCE, self.iterations - done),
+                counts, self.spacing, phi, ahead, dy, dk, dx, STEP, STEP * self.data_weight,
+            )  # fmt: skip
         return phi
 
 
@@ -84,6 +89,7 @@ def start(
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
 def iterate(
+    times: int,
     counts: NDArray,
     spacing: float,
     phi: NDArray,
@@ -94,37 +100,59 @@ def iterate(
     step: float,
     weight: float,
 ) -> None:
-    """One step of the dual and one of the primal, in one pass through memory.
+    """Some steps of dual and primal, in one pass through memory.
 
-    A line's primal step needs the dual of the lines before it, and its dual the not yet
-    changed lines behind it, so that both can be done line by line. Blocks of rows are
-    independent once the dual of each block's last row is there: the block behind needs it.
+    A row's dual step needs the row behind it, not yet changed; its primal step needs the dual of
+    the row before it. So a row can take its next step as soon as the row behind it has taken
+    the one before, while both are still in the cache. A block of rows is on its own once the dual
+    of its last row is there, for the block behind needs that; but with each further step it
+    lacks one more row at either end. These seams are made up for when all blocks are done.
     """
-    rows, planes, columns = phi.shape
-    zero = np.zeros(columns, np.float32)
-    sigma, data_weight, width = np.float32(step), np.float32(weight), np.float32(spacing)
-    blocks = (rows + BLOCK_ROWS - 1) // BLOCK_ROWS
+    rows = len(phi)
+    blocks = max(rows // BLOCK_ROWS, 1)
+    fields = counts, phi, ahead, dy, dk, dx
+    sizes = np.float32(step), np.float32(weight), np.float32(spacing)
+    for seam in prange(blocks - 1):
+        step_row((np.int64(seam) + 1) * BLOCK_ROWS - 1, True, False, fields, sizes)
     for block in prange(blocks):
-        y = min((np.int64(block) + 1) * BLOCK_ROWS, rows) - 1
-        below = min(y + 1, rows - 1)
-        for k in range(planes):
-            deep = ahead[y, min(k + 1, planes - 1)]
-            dual_step(ahead[y, k], ahead[below, k], deep, dy[y, k], dk[y, k], dx[y, k], sigma)
-    for block in prange(blocks):
-        moved = np.empty(columns, np.float32)
         first = np.int64(block) * BLOCK_ROWS
-        last = min(first + BLOCK_ROWS, rows) - 1
-        for y in range(first, last + 1):
-            for k in range(planes):
-                here, a, b, c = ahead[y, k], dy[y, k], dk[y, k], dx[y, k]
-                if y < last:
-                    dual_step(
-                        here, ahead[y + 1, k], ahead[y, min(k + 1, planes - 1)], a, b, c, sigma
-                    )
-                a_before = dy[y - 1, k] if y > 0 else zero
-                b_before = dk[y, k - 1] if k > 0 else zero
-                descend(phi[y, k], a, b, c, a_before, b_before, sigma, moved)
-                primal_step(moved, counts[y, k], phi[y, k], here, data_weight, width)
+        at_start, at_end = block == 0, block == blocks - 1
+        last = rows - 1 if at_end else first + BLOCK_ROWS - 1
+        for front in range(first, last + times):
+            for before in range(times):  # steps that the row has taken already
+                row = front - before
+                start = first if at_start else first + before
+                end = last if at_end else last - before
+                # The dual of a block's last row was there from the start, for its first step.
+                has_dual = before == 0 and row == last and not at_end
+                one_more = not at_start and before > 0 and row == start - 1
+                primal = start <= row <= end
+                if primal or one_more:
+                    step_row(row, not has_dual, primal, fields, sizes)
+    for seam in prange(blocks - 1):
+        last = (np.int64(seam) + 1) * BLOCK_ROWS - 1
+        for before in range(1, times):
+            for row in range(last - before + 1, last + before + 1):
+                step_row(row, row < last + before, True, fields, sizes)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
+def step_row(row, dual, primal, fields, sizes):  # type: ignore[no-untyped-def]
+    """A step of a row's dual, of its primal, or of both, line by line."""
+    counts, phi, ahead, dy, dk, dx = fields
+    step, weight, spacing = sizes
+    rows, planes, columns = phi.shape
+    moved, zero = np.empty(columns, np.float32), np.zeros(columns, np.float32)
+    below = min(row + 1, rows - 1)
+    for k in range(planes):
+        here, a, b, c = ahead[row, k], dy[row, k], dk[row, k], dx[row, k]
+        if dual:
+            dual_step(here, ahead[below, k], ahead[row, min(k + 1, planes - 1)], a, b, c, step)
+        if primal:
+            a_before = dy[row - 1, k] if row > 0 else zero
+            b_before = dk[row, k - 1] if k > 0 else zero
+            descend(phi[row, k], a, b, c, a_before, b_before, step, moved)
+            primal_step(moved, counts[row, k], phi[row, k], here, weight, spacing)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)

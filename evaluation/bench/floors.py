@@ -46,13 +46,12 @@ def distance_field(voxels: int) -> Floor:
 def fusion(voxels: int, iterations: int, bins: int) -> Floor:
     """Eq. 1 by primal-dual steps (Chambolle and Pock 2011).
 
-    The dual step reads phi and reads and writes three fields; the primal step reads these
-    and the counts, reads and writes phi, and writes its extrapolation. The prox takes a product,
+    phi, its extrapolation and three dual fields are read and written, and the counts read, once:
+    rows can take any number of steps while they are in the cache. The prox takes a product,
     two sums, a minimum and a maximum a bin.
     """
-    dual = Floor(7 * FLOAT * voxels, 17 * voxels)
-    primal = Floor((6 * FLOAT + COUNTS) * voxels, (8 + 5 * bins) * voxels)
-    return (dual + primal) * iterations
+    operations = 17 + 8 + 5 * bins
+    return Floor((10 * FLOAT + COUNTS) * voxels, operations * iterations * voxels)
 
 
 def ray_cast(voxels: int, pixels: int) -> Floor:

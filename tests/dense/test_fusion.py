@@ -84,11 +84,23 @@ def test_prox_equals_a_numerical_minimizer(counts: list[int], v: float, weight: 
 
 
 @pytest.mark.kernel
-def test_fusion_equals_the_loops() -> None:
+@pytest.mark.parametrize("rows", [1, 5, 32, 53])  # of one block, of whole blocks, of a longer last
+@pytest.mark.parametrize("iterations", [1, 4, 7])
+def test_fusion_equals_the_loops(rows: int, iterations: int) -> None:
     rng = np.random.default_rng(0)
-    counts = rng.integers(0, 4, (5, 6, 9, 8)) * (rng.random((5, 6, 9, 1)) > 0.3)
-    fast = Fusion(0.26, 7).fuse(pack(counts))
-    np.testing.assert_allclose(fast, slow_fuse(counts, 0.26, 7), atol=2e-5)
+    counts = rng.integers(0, 4, (rows, 6, 9, 8)) * (rng.random((rows, 6, 9, 1)) > 0.3)
+    fast = Fusion(0.26, iterations).fuse(pack(counts))
+    np.testing.assert_allclose(fast, slow_fuse(counts, 0.26, iterations), atol=2e-5)
+
+
+@pytest.mark.parametrize("at_once", [1, 3, 8])
+def test_iterations_in_one_pass_change_no_bit(
+    at_once: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = np.random.default_rng(3).integers(0, 2**32, (77, 5, 20), dtype=np.uint32)
+    usual = Fusion(0.26, 8).fuse(words).copy()
+    monkeypatch.setattr(fusion, "AT_ONCE", at_once)
+    np.testing.assert_array_equal(Fusion(0.26, 8).fuse(words), usual)
 
 
 def test_energy_falls_with_iterations() -> None:

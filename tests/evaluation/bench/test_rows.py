@@ -140,7 +140,7 @@ def test_floors_count_what_must_move() -> None:
     voxels = 376 * 240 * 150
     # A word of 4 bytes a voxel in and out; seven arrays and seven, eight times.
     assert floors.distance_field(voxels).bytes_moved == 8 * voxels
-    assert floors.fusion(voxels, 8, 8).bytes_moved == 56 * 8 * voxels
+    assert floors.fusion(voxels, 8, 8).bytes_moved == 44 * voxels
     # 16-bit costs of 200 planes, read and written.
     assert floors.add_frame(376 * 240, 200).bytes_moved == 4 * 376 * 240 * 200
     assert floors.transforms(1024, 9).operations == 2.5 * 1024 * 10 * 9
