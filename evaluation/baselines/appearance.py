@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.se3 import SE3, nearest_rotation
+from evaluation.baselines.clear_matches import clear_matches
 from evaluation.baselines.seam import Answer, Given, View
 
-RATIO = 0.8
-"""A match must be this much nearer than the second best (Lowe, IJCV 2004, Sec. 7.1)."""
 REPROJECTION_PX = 4.0
 ITERATIONS = 5_000
 CONFIDENCE = 0.9999
@@ -79,7 +78,7 @@ def matches_of(
     made = []
     for view in ground_views:
         ground_px, ground_words = _features(view.grey, detector)
-        pairs = _pairs(aerial_words, ground_words)
+        pairs = clear_matches(aerial_words, ground_words)
         points, seen = _points_map(view, ground_px[pairs[:, 1]])
         pairs, points = pairs[seen], points[seen]
         kept = _distinct(aerial_px[pairs[:, 0]], ground_px[pairs[:, 1]])
@@ -129,19 +128,6 @@ def _features(
     if words is None or len(keypoints) == 0:
         return np.empty((0, 2)), np.empty((0, 128), np.float32)
     return np.asarray(cv2.KeyPoint.convert(keypoints), np.float64), words.astype(np.float32)
-
-
-def _pairs(aerial: NDArray[np.float32], ground: NDArray[np.float32]) -> NDArray[np.int64]:
-    """(N, 2) indices of features whose best match is clearly better than the second."""
-    if len(aerial) < 2 or len(ground) < 2:
-        return np.empty((0, 2), np.int64)
-    matcher = cv2.BFMatcher(cv2.NORM_L2)
-    pairs = [
-        (best.queryIdx, best.trainIdx)
-        for best, second in matcher.knnMatch(aerial, ground, k=2)
-        if best.distance < RATIO * second.distance
-    ]
-    return np.array(pairs, np.int64).reshape(-1, 2)
 
 
 def _distinct(aerial_px: NDArray, ground_px: NDArray) -> NDArray[np.int64]:
