@@ -138,7 +138,7 @@ def test_all_cores_can_do_what_one_can() -> None:
 
 def test_floors_count_what_must_move() -> None:
     voxels = 376 * 240 * 150
-    # A word of 4 bytes a voxel in and out; seven arrays and seven, eight times.
+    # A word of 4 bytes a voxel in and out; five fields in and out, and the counts in.
     assert floors.distance_field(voxels).bytes_moved == 8 * voxels
     assert floors.fusion(voxels, 8, 8).bytes_moved == 44 * voxels
     # 16-bit costs of 200 planes, read and written.
