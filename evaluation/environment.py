@@ -68,8 +68,10 @@ def _keep_freed_memory() -> None:
 
     By default glibc hands every array of more than some 100 kB back to the system, which has
     to clear its pages again for the next one: a fifth of the time of reading an image. Other C
-    libraries have no such setting and are left alone.
+    libraries have no such setting and are left alone. Children read theirs from the environment.
     """
+    for name in ("MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"):
+        os.environ.setdefault(name, str(KEPT_BYTES))
     try:
         mallopt = ctypes.CDLL(None).mallopt
     except (OSError, AttributeError):

@@ -1,0 +1,61 @@
+"""What is settled before the first heavy import, seen from a child process."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from airground.errors import InputError
+from evaluation.environment import prepare, usable_cores
+
+FAULTS = """
+import resource
+import numpy as np
+np.ones(1_000_000)
+before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+for _ in range(20):
+    np.ones(1_000_000)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+"""
+SETTINGS = ("MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_")
+
+
+def faults(environment: dict[str, str]) -> int:
+    """Pages that a process of this environment is given while it makes and drops arrays."""
+    command = [sys.executable, "-c", FAULTS]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    return int(done.stdout)
+
+
+def test_children_keep_what_they_free(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in SETTINGS:
+        monkeypatch.delenv(name, raising=False)
+    usual = faults(dict(os.environ))
+    if usual < 5_000:
+        pytest.skip("the allocator of this machine keeps what is freed anyway")
+    prepare()
+    assert faults(dict(os.environ)) < usual / 10
+
+
+def test_what_the_user_set_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(SETTINGS[0], "1000000")
+    monkeypatch.setenv("NUMBA_NUM_THREADS", "1")
+    prepare()
+    assert os.environ[SETTINGS[0]] == "1000000"
+    assert os.environ["NUMBA_NUM_THREADS"] == "1"
+
+
+def test_a_container_bounds_the_cores(tmp_path: Path) -> None:
+    cores = len(os.sched_getaffinity(0))
+    quota = tmp_path / "cpu.max"
+    for text, count in (("100000 100000\n", 1), ("max 100000\n", cores), ("nonsense", cores)):
+        quota.write_text(text, encoding="ascii")
+        assert usable_cores(quota) == count
+    assert usable_cores(tmp_path / "none") == cores
+
+
+def test_no_threads_is_refused() -> None:
+    with pytest.raises(InputError, match="--threads 0: must be at least 1"):
+        prepare(0)
