@@ -10,7 +10,6 @@ import pytest
 
 from evaluation import doctor
 from evaluation.doctor import Finding, Health
-from evaluation.environment import prepare, usable_cores
 from evaluation.system_libraries import SystemLibrary
 
 MISSING = SystemLibrary("libmissing.so.7", "libmissing7", "everything")
@@ -64,24 +63,3 @@ def test_libraries_are_listed_without_any_package_installed() -> None:
         [sys.executable, "-S", "-I", file], capture_output=True, text=True, check=True
     )
     assert done.stderr == ""
-
-
-def test_a_containers_quota_limits_the_threads(tmp_path: Path) -> None:
-    quota = tmp_path / "cpu.max"
-    quota.write_text("50000 100000\n")
-    assert usable_cores(quota) == 1
-    everything = usable_cores(tmp_path / "none")
-    quota.write_text("max 100000\n")
-    assert usable_cores(quota) == everything
-
-
-def test_threads_are_set_for_every_library(monkeypatch: pytest.MonkeyPatch) -> None:
-    names = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
-    environment = {"OMP_NUM_THREADS": "7"}
-    monkeypatch.setattr("os.environ", environment)
-    prepare()
-    assert environment["OMP_NUM_THREADS"] == "7"
-    prepare(threads=3)
-    assert [environment[name] for name in names] == ["3", "3", "3"]
-    assert environment["OPENBLAS_NUM_THREADS"] == "1"
-    assert environment["MUJOCO_GL"] in ("egl", "osmesa")
