@@ -50,6 +50,11 @@ class FrameRing:
         self._free = context.Semaphore(slots)
         self._put = 0
 
+    @property
+    def memory_mib(self) -> float:
+        """Of all slots; both processes count it as theirs."""
+        return self._slots * self._slot_bytes / 2**20
+
     def put(self, frame: TrackedFrame, pipe: Connection) -> None:
         """Hand a frame over, as soon as there is room."""
         image = frame.image

@@ -49,7 +49,8 @@ class TrackingReport:
     Attributes:
         tracked: What the front ends said, by robot ("mav", "ground").
         ground: The ground robot's path as believed at last; None where it has none.
-        processor_s, peak_memory_mib: Of tracking in a process of its own; else 0.
+        processor_s, peak_memory_mib: Of tracking in a process of its own, without the images that
+            it shares with mapping; else 0.
     """
 
     tracked: dict[str, Tracked]

@@ -116,6 +116,7 @@ def _track(order: _Order, ring: FrameRing, pipe: Connection) -> None:
         pipe.send(None)
         report = here.report()
         processor_s = time.process_time() - started_s
-        pipe.send(TrackingReport(report.tracked, report.ground, processor_s, peak_memory_mib()))
+        memory_mib = peak_memory_mib() - ring.memory_mib
+        pipe.send(TrackingReport(report.tracked, report.ground, processor_s, memory_mib))
     except AirgroundError as error:
         pipe.send(error)
