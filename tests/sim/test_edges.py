@@ -87,3 +87,9 @@ def test_every_box_of_a_heap_keeps_its_edges(tmp_path: Path) -> None:
     back = Edges.load(tmp_path / "edges.npz")
     for name in ("ends", "faces", "creased", "planes"):
         np.testing.assert_array_equal(getattr(back, name), getattr(edges, name))
+
+
+def test_the_ground_does_not_stand_in_itself() -> None:
+    heights = np.random.default_rng(0).normal(0, 0.05, (23, 31))
+    ground = HeightField(heights, np.array([1.7, 2.3]))
+    assert len(find_edges(ground.mesh(), ground).ends) == len(find_edges(ground.mesh()).ends)
