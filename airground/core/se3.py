@@ -93,7 +93,7 @@ class SE3:
 
     def angle(self) -> float:
         """Angle of the rotation [rad], in [0, pi] (angle-axis, as in Fig. 14)."""
-        return float(np.linalg.norm(self.rotation_vector()))
+        return rotation_angle(self.rotation)
 
     def heading(self) -> float:
         """Turn about z [rad] that best explains the rotation, in (-pi, pi]."""
@@ -150,6 +150,14 @@ def _flaws(rotation: NDArray, translation: NDArray) -> tuple[float, bool]:
         + r[0, 2] * (r[1, 0] * r[2, 1] - r[1, 1] * r[2, 0])
     )
     return (off if finite else np.nan), determinant < 0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def rotation_angle(rotation: NDArray) -> float:
+    """Angle of a rotation (3, 3) [rad], in [0, pi], exact to rounding everywhere."""
+    r = rotation
+    x, y, z = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
+    return math.atan2(math.sqrt(x * x + y * y + z * z), r[0, 0] + r[1, 1] + r[2, 2] - 1.0)
 
 
 def interpolate(start: SE3, end: SE3, fraction: float) -> SE3:

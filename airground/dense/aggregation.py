@@ -66,38 +66,64 @@ def aggregate(
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _change_row(
-    costs: NDArray, limits: NDArray, y: int, sign: int, sums: NDArray, counts: NDArray, margin: int
+def _slide_down(
+    costs: NDArray,
+    limits: NDArray,
+    enters: int,
+    leaves: int,
+    sums: NDArray,
+    counts: NDArray,
+    margin: int,
 ) -> None:
-    """Adds (sign 1) or takes away (sign -1) image row y from the running window sums."""
+    """Image row `enters` joins the running window sums, and row `leaves` goes; -1 is no row."""
     _, planes, width = costs.shape
-    signed = np.int32(sign)
-    views = np.int32(sign * len(limits))
     for p in range(planes):
         total, count = sums[p, margin : margin + width], counts[p, margin : margin + width]
-        row = costs[y, p]
-        for x in range(width):
-            total[x] += signed * np.int32(row[x])
-        for x in range(width):
-            count[x] += views
-        # most views cover most of a row: take away what each does not
-        for v in range(len(limits)):
-            before, after = count[: limits[v, y, p, 0]], count[limits[v, y, p, 1] :]
-            for x in range(len(before)):
-                before[x] -= signed
-            for x in range(len(after)):
-                after[x] -= signed
+        if enters >= 0 and leaves >= 0:
+            new, old = costs[enters, p], costs[leaves, p]
+            for x in range(width):
+                total[x] += np.int32(new[x]) - np.int32(old[x])
+        elif enters >= 0:
+            new = costs[enters, p]
+            for x in range(width):
+                total[x] += np.int32(new[x])
+        elif leaves >= 0:
+            old = costs[leaves, p]
+            for x in range(width):
+                total[x] -= np.int32(old[x])
+        if enters >= 0:
+            _count_views(limits[:, enters, p], count, 1)
+        if leaves >= 0:
+            _count_views(limits[:, leaves, p], count, -1)
+
+
+@njit(cache=True, error_model="numpy")
+def _count_views(limits: NDArray, count: NDArray, sign: int) -> None:
+    """Add to `count` (sign 1), or take away (-1), how many views cover each pixel of a row."""
+    signed, views = np.int16(sign), np.int16(sign * len(limits))
+    for x in range(len(count)):
+        count[x] += views
+    # Most views cover most of a row: take away what each does not.
+    for v in range(len(limits)):
+        before, after = count[: limits[v, 0]], count[limits[v, 1] :]
+        for x in range(len(before)):
+            before[x] -= signed
+        for x in range(len(after)):
+            after[x] -= signed
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
 def _window_sum(source: NDArray, out: NDArray, radius: int) -> None:
     """out[x] = sum of source[x : x + 2 radius + 1]."""
     width = len(out)
-    out[:] = 0
-    for i in range(2 * radius + 1):
-        shifted = source[i : i + width]
+    middle = source[radius : radius + width]
+    for x in range(width):
+        out[x] = middle[x]
+    # Two columns at a time, so that the sums so far are read and written half as often.
+    for i in range(1, radius + 1):
+        left, right = source[radius - i :], source[radius + i :]
         for x in range(width):
-            out[x] += shifted[x]
+            out[x] += left[x] + right[x]
 
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
@@ -132,18 +158,19 @@ def box_mean(
         begin = task * ROWS_A_TASK
         end = min(begin + ROWS_A_TASK, height)
         sums = np.zeros((2, planes, padded), np.int32)
-        counts = np.zeros((2, planes, padded), np.int32)
-        total, count = np.empty((2, width), np.int32), np.empty((2, width), np.int32)
+        counts = np.zeros((2, planes, padded), np.int16)
+        total, count = np.empty((2, width), np.int32), np.empty((2, width), np.int16)
         block = np.empty((planes, width), np.uint16)
-        for y in range(max(begin - radius, 0), min(begin + radius, height)):
-            _change_row(first, first_limits, y, 1, sums[0], counts[0], radius)
+        for y in range(begin - 2 * radius, end):
+            # The window ends `radius` rows further down; that of the row before began `radius`
+            # rows further up. The first of them starts with nothing in it.
+            enters = y + radius if 0 <= y + radius < height else -1
+            leaves = y - radius - 1 if y > begin and y - radius - 1 >= 0 else -1
+            _slide_down(first, first_limits, enters, leaves, sums[0], counts[0], radius)
             if both:
-                _change_row(last, last_limits, y, 1, sums[1], counts[1], radius)
-        for y in range(begin, end):
-            if y + radius < height:
-                _change_row(first, first_limits, y + radius, 1, sums[0], counts[0], radius)
-                if both:
-                    _change_row(last, last_limits, y + radius, 1, sums[1], counts[1], radius)
+                _slide_down(last, last_limits, enters, leaves, sums[1], counts[1], radius)
+            if y < begin:
+                continue
             for p in range(planes):
                 _window_sum(sums[0, p], total[0], radius)
                 _window_sum(counts[0, p], count[0], radius)
@@ -154,10 +181,6 @@ def box_mean(
                 else:
                     _mean(total[0], count[0], factor, ceiling, block[p])
             _transpose(block, mean[y])
-            if y - radius >= 0:
-                _change_row(first, first_limits, y - radius, -1, sums[0], counts[0], radius)
-                if both:
-                    _change_row(last, last_limits, y - radius, -1, sums[1], counts[1], radius)
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
@@ -166,7 +189,7 @@ def _mean(
 ) -> None:
     """Sum over number of samples, as stored."""
     for x in range(len(out)):
-        value = factor * np.float32(total[x]) / np.float32(max(count[x], np.int32(1)))
+        value = factor * np.float32(total[x]) / np.float32(max(count[x], np.int16(1)))
         out[x] = np.uint16(np.int32(value if count[x] > 0 else ceiling))
 
 
@@ -180,7 +203,7 @@ def _mean_of_sides(
     out: NDArray,
 ) -> None:
     """The mean over both sides, or over the better one plus a penalty, whichever is lower."""
-    one = np.int32(1)
+    one = np.int16(1)
     total0, total1, count0, count1 = total[0], total[1], count[0], count[1]
     for x in range(len(out)):
         n0, n1 = count0[x], count1[x]

@@ -46,31 +46,23 @@ class Fusion:
         if self._memory is None or self._memory.shape[1:] != counts.shape:
             self._memory = np.empty((5, *counts.shape), np.float32)
         phi, ahead, dy, dk, dx = self._memory
-        start(counts, self.spacing, phi, ahead, dy, dk, dx)
+        start(counts, self.spacing, phi)
         for done in range(0, self.iterations, AT_ONCE):
             iterate(
-                min(AT_ONCE, self.iterations - done),
+                min(AT_ONCE, self.iterations - done), done == 0,
                 counts, self.spacing, phi, ahead, dy, dk, dx, STEP, STEP * self.data_weight,
             )  # fmt: skip
         return phi
 
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
-def start(
-    counts: NDArray,
-    spacing: float,
-    phi: NDArray,
-    ahead: NDArray,
-    dy: NDArray,
-    dk: NDArray,
-    dx: NDArray,
-) -> None:
-    """phi at the mean of its histogram, the dual at zero."""
+def start(counts: NDArray, spacing: float, phi: NDArray) -> None:
+    """phi at the mean of its histogram."""
     rows, planes, columns = counts.shape
     width = np.float32(spacing)
     for y in prange(rows):
         for k in range(planes):
-            word, out, copy = counts[y, k], phi[y, k], ahead[y, k]
+            word, out = counts[y, k], phi[y, k]
             for x in range(columns):
                 votes, total = np.uint32(0), np.uint32(0)
                 for j in range(8):
@@ -79,17 +71,13 @@ def start(
                     total += n * np.uint32(j)
                 many = np.float32(max(votes, np.uint32(1)))
                 mean = (np.float32(total) / many + np.float32(0.5)) * width
-                value = mean - np.float32(1) if votes > 0 else np.float32(UNSEEN)
-                out[x] = value
-                copy[x] = value
-            dy[y, k, :] = np.float32(0)
-            dk[y, k, :] = np.float32(0)
-            dx[y, k, :] = np.float32(0)
+                out[x] = mean - np.float32(1) if votes > 0 else np.float32(UNSEEN)
 
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
 def iterate(
     times: int,
+    from_start: bool,
     counts: NDArray,
     spacing: float,
     phi: NDArray,
@@ -107,13 +95,16 @@ def iterate(
     the one before, while both are still in the cache. A block of rows is on its own once the dual
     of its last row is there, for the block behind needs that; but with each further step it
     lacks one more row at either end. These seams are made up for when all blocks are done.
+
+    With `from_start`, the dual counts as zero and the extrapolation as phi, whatever they hold:
+    filling them first would cost two passes through memory.
     """
     rows = len(phi)
     blocks = max(rows // BLOCK_ROWS, 1)
     fields = counts, phi, ahead, dy, dk, dx
     sizes = np.float32(step), np.float32(weight), np.float32(spacing)
     for seam in prange(blocks - 1):
-        step_row((np.int64(seam) + 1) * BLOCK_ROWS - 1, True, False, fields, sizes)
+        step_row((np.int64(seam) + 1) * BLOCK_ROWS - 1, True, from_start, False, fields, sizes)
     for block in prange(blocks):
         first = np.int64(block) * BLOCK_ROWS
         at_start, at_end = block == 0, block == blocks - 1
@@ -128,31 +119,37 @@ def iterate(
                 one_more = not at_start and before > 0 and row == start - 1
                 primal = start <= row <= end
                 if primal or one_more:
-                    step_row(row, not has_dual, primal, fields, sizes)
+                    fresh = from_start and before == 0
+                    step_row(row, not has_dual, fresh, primal, fields, sizes)
     for seam in prange(blocks - 1):
         last = (np.int64(seam) + 1) * BLOCK_ROWS - 1
         for before in range(1, times):
             for row in range(last - before + 1, last + before + 1):
-                step_row(row, row < last + before, True, fields, sizes)
+                step_row(row, row < last + before, False, True, fields, sizes)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def step_row(row, dual, primal, fields, sizes):  # type: ignore[no-untyped-def]
-    """A step of a row's dual, of its primal, or of both, line by line."""
+def step_row(row, dual, fresh, primal, fields, sizes):  # type: ignore[no-untyped-def]
+    """A step of a row's dual (`fresh`: its first of all), of its primal, or of both."""
     counts, phi, ahead, dy, dk, dx = fields
+    leading = phi if fresh else ahead
     step, weight, spacing = sizes
     rows, planes, columns = phi.shape
     moved, zero = np.empty(columns, np.float32), np.zeros(columns, np.float32)
     below = min(row + 1, rows - 1)
     for k in range(planes):
-        here, a, b, c = ahead[row, k], dy[row, k], dk[row, k], dx[row, k]
+        a, b, c = dy[row, k], dk[row, k], dx[row, k]
         if dual:
-            dual_step(here, ahead[below, k], ahead[row, min(k + 1, planes - 1)], a, b, c, step)
+            here, down = leading[row, k], leading[below, k]
+            deep = leading[row, min(k + 1, planes - 1)]
+            if fresh:
+                a[:], b[:], c[:] = zero, zero, zero
+            dual_step(here, down, deep, a, b, c, step)
         if primal:
             a_before = dy[row - 1, k] if row > 0 else zero
             b_before = dk[row, k - 1] if k > 0 else zero
             descend(phi[row, k], a, b, c, a_before, b_before, step, moved)
-            primal_step(moved, counts[row, k], phi[row, k], here, weight, spacing)
+            primal_step(moved, counts[row, k], phi[row, k], ahead[row, k], weight, spacing)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)

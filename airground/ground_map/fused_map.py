@@ -9,6 +9,7 @@ When SLAM corrects poses, the map follows: keyframes are kept, and fused anew wh
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +20,7 @@ from airground.config import GroundMapping
 from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
 from airground.core.messages import GroundImage
-from airground.core.se3 import SE3
+from airground.core.se3 import SE3, rotation_angle
 from airground.core.trajectory import Trajectory
 from airground.ground_map.keyframe import GroundKeyframe
 
@@ -172,8 +173,6 @@ def _corrected(keyframe: GroundKeyframe, trajectory: Trajectory) -> GroundKeyfra
 
 def _moved(start: SE3, end: SE3, distance_m: float, angle_deg: float) -> bool:
     """Whether a pose is this far from another, or turned this much."""
-    motion = start.inverse() @ end
-    return (
-        float(np.linalg.norm(motion.translation)) >= distance_m
-        or np.rad2deg(motion.angle()) >= angle_deg
-    )
+    distance = math.dist(start.translation, end.translation)
+    turn = rotation_angle(start.rotation.T @ end.rotation)
+    return distance >= distance_m or math.degrees(turn) >= angle_deg

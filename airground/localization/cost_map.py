@@ -168,7 +168,7 @@ class Overlays:
 
     Attributes:
         sums: (M, 6) as in `cost_kernels`, heights about the maps' means.
-        mean_aerial, mean_ground: Those means [m].
+        mean_aerial, mean_ground: Those means [m], the ground's where an overlay can reach.
         aerial_cells: Filled cells of the aerial map.
     """
 
@@ -213,21 +213,46 @@ class Overlays:
 
 def overlay_at(aerial: HeightMap, ground: HeightMap, positions: NDArray) -> Overlays:
     """Lay the aerial map at M positions u (M, 2) [m] over the ground map, bilinearly."""
-    a, g = masked(aerial.heights), masked(ground.heights, margin=1)
-    origin = lattice_index(aerial) - lattice_index(ground) + 1
-    shifts = np.asarray(positions, np.float64) * ground.cells_per_m + origin
+    places = np.asarray(positions, np.float64) * ground.cells_per_m
+    heights, first = _within_reach(ground, places, reach_of(aerial))
+    a, g = masked(aerial.heights), masked(heights, margin=1)
+    shifts = places + (lattice_index(aerial) - first + 1)
     sums = sums_at_positions(a.heights, a.mask, g.heights, g.mask, shifts)
     return Overlays(sums, a.mean, g.mean, aerial.filled_cells)
 
 
 def overlay_turned(aerial: HeightMap, ground: HeightMap, poses: NDArray) -> Overlays:
     """The same for M poses (M, 3): x, y [m], and a turn of the aerial map [rad]."""
-    cells, mean_aerial = filled_cells(aerial.heights, *lattice_index(aerial))
-    pairs, mean_ground = paired(ground.heights)
     poses = np.array(poses, np.float64)
-    poses[:, :2] = poses[:, :2] * ground.cells_per_m - lattice_index(ground) + MARGIN
+    poses[:, :2] *= ground.cells_per_m
+    farthest = int(np.ceil(np.linalg.norm(np.abs(reach_of(aerial)).max(axis=0))))
+    reach = np.array([[-farthest, -farthest], [farthest, farthest]])
+    heights, first = _within_reach(ground, poses[:, :2], reach)
+    cells, mean_aerial = filled_cells(aerial.heights, *lattice_index(aerial))
+    pairs, mean_ground = paired(heights)
+    poses[:, :2] += MARGIN - first
     sums = sums_at_poses(cells, pairs, poses)
     return Overlays(sums, mean_aerial, mean_ground, cells.shape[1])
+
+
+def _within_reach(
+    ground: HeightMap, places: NDArray, reach_cells: NDArray
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """The ground heights that aerial maps about these places can lie on, and their first cell.
+
+    Particles gather; preparing all of the ground map for them would take longer than using it.
+
+    Args:
+        ground: All of it.
+        places: (M, 2) on its lattice [cells].
+        reach_cells: (2, 2) as for `OffsetSearch`.
+    """
+    edge = lattice_index(ground)
+    low = np.floor(places.min(axis=0)).astype(np.int64) + reach_cells[0] - edge
+    high = np.floor(places.max(axis=0)).astype(np.int64) + reach_cells[1] + 2 - edge
+    low = np.clip(low, 0, ground.heights.shape)
+    high = np.clip(high, low, ground.heights.shape)
+    return ground.heights[low[0] : high[0], low[1] : high[1]].copy(), edge + low
 
 
 def _window(heights: NDArray[np.float32], start: NDArray, extent: NDArray) -> NDArray[np.float32]:

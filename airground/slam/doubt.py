@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from airground.core.se3 import SE3
+from airground.core.se3 import SE3, rotation_angle
 from airground.slam.rig_state import RigState
 
 MAX_JUMP_M = 0.25
@@ -33,7 +33,7 @@ def surprising(T_map_camera: SE3, expected: SE3, unseen_s: float) -> bool:
         expected: As predicted.
         unseen_s: How long the prediction is without a look at the scene [s].
     """
-    turn = SE3(T_map_camera.rotation.T @ expected.rotation, np.zeros(3)).angle()
+    turn = rotation_angle(T_map_camera.rotation.T @ expected.rotation)
     return jumps(T_map_camera, expected, MAX_DRIFT_MPS * unseen_s) or turn > MAX_TURN_RAD
 
 

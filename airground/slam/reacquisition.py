@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.camera import PinholeCamera
-from airground.core.se3 import SE3
+from airground.core.se3 import SE3, rotation_angle
 from airground.slam.optical_flow import flow_both_ways
 from airground.slam.sparse_map import SparseMap
 
@@ -64,7 +64,7 @@ def keyframes_in_view(
             break
         keyframe = sparse_map.keyframes[k]
         R_map_camera = keyframe.state.rotation @ T_rig_camera.rotation
-        turn = SE3(T_map_camera.rotation.T @ R_map_camera, np.zeros(3)).angle()
+        turn = rotation_angle(T_map_camera.rotation.T @ R_map_camera)
         ids = keyframe.ids[sparse_map.mapped(keyframe.ids)]
         centre = sparse_map.positions[ids].mean(axis=0)
         here = float(axis @ (centre - T_map_camera.translation))

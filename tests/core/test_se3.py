@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import expm
 
-from airground.core.se3 import SE3, interpolate, nearest_rotation
+from airground.core.se3 import SE3, interpolate, nearest_rotation, rotation_angle
 
 coordinate = st.floats(-10, 10)
 twists = st.lists(st.floats(-1.5, 1.5), min_size=6, max_size=6).map(np.array)
@@ -47,6 +47,14 @@ def test_exp_is_the_matrix_exponential(twist: np.ndarray) -> None:
     generator[:3, :3] = [[0, -z, y], [z, 0, -x], [-y, x, 0]]
     generator[:3, 3] = twist[:3]
     assert np.allclose(SE3.exp(twist).matrix(), expm(generator), atol=1e-9)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-12, 1e-6, 0.1, 2.0, np.pi - 1e-9, np.pi])
+def test_the_angle_is_exact_from_nothing_to_half_a_turn(angle: float) -> None:
+    for axis in np.random.default_rng(0).normal(size=(20, 3)):
+        turn = SE3.from_rotation_vector(angle * axis / np.linalg.norm(axis))
+        assert turn.angle() == pytest.approx(angle, rel=1e-9, abs=2e-15)
+        assert rotation_angle(turn.rotation.T) == pytest.approx(angle, rel=1e-9, abs=2e-15)
 
 
 @given(motions)

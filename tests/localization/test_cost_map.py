@@ -76,6 +76,27 @@ def test_particles_equal_naive_interpolation(cost):
     np.testing.assert_allclose(turned.costs(setting), found, rtol=2e-3, atol=1e-4)
 
 
+@pytest.mark.parametrize("turned", [False, True])
+def test_a_particle_alone_costs_what_it_costs_among_others(turned):
+    """Alone, only the ground within its reach is looked at."""
+    rng = np.random.default_rng(15)
+    aerial, ground = random_map(rng, (14, 11), (-9, -4)), random_map(rng, (46, 50), (-22, -23))
+    poses = rng.uniform(-3.5, 3.5, (60, 3))  # some on the edge, some beyond it
+    if turned:
+        overlay = lambda poses: overlay_turned(aerial, ground, poses)  # noqa: E731
+    else:
+        overlay = lambda poses: overlay_at(aerial, ground, poses[:, :2])  # noqa: E731
+    together = overlay(poses)
+    alone = [overlay(pose[None]) for pose in poses]
+    np.testing.assert_array_equal(together.sums[:, 0], [one.sums[0, 0] for one in alone])
+    assert (together.sums[:, 0] > 100).any()
+    assert (together.sums[:, 0] == 0).any()
+    offsets = [one.height_offsets()[0] for one in alone]
+    np.testing.assert_allclose(together.height_offsets(), offsets, atol=1e-5)
+    costs = [one.costs(config("ncc"))[0] for one in alone]
+    np.testing.assert_allclose(together.costs(config("ncc")), costs, atol=1e-4)
+
+
 @pytest.mark.parametrize("cost", ["zmssd", "ncc"])
 def test_a_particle_on_the_lattice_costs_what_the_map_says(cost):
     rng = np.random.default_rng(6)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from airground.core.arrays import read_only
 from airground.core.camera import PinholeCamera
-from airground.core.se3 import SE3, nearest_rotation
+from airground.core.se3 import SE3, nearest_rotation, rotation_angle
 from airground.slam.geometry.epipolar import direction_by_two_rays, refine
 from airground.slam.geometry.triangulation import Triangulated, triangulate_pairs
 
@@ -74,7 +74,7 @@ class _Answer:
     direction_sigma: float
 
     def same_as(self, other: _Answer) -> bool:
-        turn = SE3(self.T_a_b.rotation.T @ other.T_a_b.rotation, np.zeros(3)).angle()
+        turn = rotation_angle(self.T_a_b.rotation.T @ other.T_a_b.rotation)
         cosine = self.T_a_b.translation @ other.T_a_b.translation
         return turn < SAME_ANSWER and cosine > np.cos(2 * SAME_ANSWER)
 
