@@ -21,14 +21,14 @@ class Playback:
         waiting_frames: How many images may wait before each tracker, 8 being a quarter of a
             second at 30 Hz.
         frames_under_way: How many tracked frames of each robot may wait before the mapper:
-            some three seconds at 30 Hz, about 200 MiB.
+            five seconds at 30 Hz, some 370 MiB when all of it is full.
         radio: What lies between the MAV and the ground robot; None for one computer.
         patience_s: How long the mapper waits for a robot that is silent.
     """
 
     rate: float = 1.0
     waiting_frames: int = 8
-    frames_under_way: int = 90
+    frames_under_way: int = 150
     radio: RadioLimits | None = None
     patience_s: float = 2.0
 

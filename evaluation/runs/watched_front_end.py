@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 from airground.core.messages import GroundImage, ImuSamples, MavImage
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.slam.front_end import FrontEnd, TrackedPose, Tracking
+from evaluation.runs.answer_log import AnswerLog
 
 Image = TypeVar("Image", MavImage, GroundImage)
 
@@ -24,7 +25,7 @@ class FrontEndLog:
             decoding not.
     """
 
-    answers: list[TrackedPose] = field(default_factory=list)
+    answers: AnswerLog = field(default_factory=AnswerLog)
     durations_ms: list[float] = field(default_factory=list)
 
     def live_poses(self) -> list[tuple[int, SE3]]:
@@ -63,8 +64,7 @@ class WatchedFrontEnd(FrontEndLog, Generic[Image]):
         answer = self._inner.track(image)
         self.durations_ms.append(1e3 * (time.perf_counter() - started + self._imu_s))
         self._imu_s = 0.0
-        # Corners are for who looks on meanwhile; of a long recording they would fill memory.
-        self.answers.append(replace(answer, corners=None))
+        self.answers.append(answer)
         return answer
 
     def finish(self) -> None:

@@ -30,10 +30,9 @@ class Standing:
 
 
 def test_corners_are_passed_on_and_not_kept() -> None:
-    """They are most of an answer's bytes, and a long recording has many answers."""
     watched: WatchedFrontEnd[MavImage] = WatchedFrontEnd(Standing())
     said = watched.track(MavImage(5, np.zeros((4, 4), np.uint8)))
     assert said.corners is CORNERS
     (kept,) = watched.log().answers
     assert kept.corners is None
-    assert (kept.stamp_ns, kept.T_map_camera) == (said.stamp_ns, said.T_map_camera)
+    assert (kept.stamp_ns, kept.tracking) == (said.stamp_ns, said.tracking)

@@ -19,6 +19,7 @@ from airground.io.recording import Recording
 from evaluation import cli
 from evaluation.figures.style import save_picture
 from evaluation.protocol.setups import Setup
+from evaluation.runs.answer_log import AnswerLog
 from evaluation.runs.recording import RunResult
 from evaluation.runs.watched_front_end import FrontEndLog
 from evaluation.showcase.close_up import CloseUp
@@ -44,7 +45,7 @@ SOURCES = np.array([Source.GROUND, Source.MAV, Source.MAV], np.uint8)
 def result() -> RunResult:
     frames = {"mav": run.mav_frame(2 * run.SECOND), "ground": run.ground_frame(run.SECOND)}
     tracked = {
-        robot: Tracked(robot, FrontEndLog([frame.pose]), None, slam=True)
+        robot: Tracked(robot, FrontEndLog(AnswerLog([frame.pose])), None, slam=True)
         for robot, frame in frames.items()
     }
     augmented = AugmentedMap(run.CLOUD, SOURCES)
