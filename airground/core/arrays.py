@@ -22,16 +22,20 @@ def read_only(
         ValueError: The shape differs, or the conversion to `dtype` is not safe.
     """
     array = np.ascontiguousarray(value)
-    if array.dtype != np.dtype(dtype):
+    if array.dtype != dtype:
         if not np.can_cast(array.dtype, dtype, casting="same_kind"):
             raise ValueError(f"{name}: expected {np.dtype(dtype)}, got {array.dtype}")
         array = array.astype(dtype)
-    fits = array.ndim == len(shape) and all(
-        want is None or have == want for have, want in zip(array.shape, shape, strict=True)
-    )
-    if not fits:
+    if array.shape != shape and not _fits(array.shape, shape):
         expected = "x".join("*" if n is None else str(n) for n in shape)
         raise ValueError(f"{name}: expected shape {expected}, got {array.shape}")
     view = array.view()
     view.flags.writeable = False
     return view
+
+
+def _fits(shape: tuple[int, ...], expected: Sequence[int | None]) -> bool:
+    """Whether each dimension is as long as expected, or may have any length."""
+    return len(shape) == len(expected) and all(
+        want is None or have == want for have, want in zip(shape, expected, strict=True)
+    )

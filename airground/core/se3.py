@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from airground.core.arrays import read_only
 
 ROTATION_TOLERANCE = 1e-6
+_NEWTON = 1.5 * np.eye(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +114,7 @@ class SE3:
             rotation = self.rotation @ other.rotation
             # One Newton step toward the nearest rotation keeps long chains orthonormal: the
             # error of a product is all but nothing already, and is squared by it.
-            rotation = rotation @ (1.5 * np.eye(3) - 0.5 * rotation.T @ rotation)
+            rotation = rotation @ (_NEWTON - 0.5 * rotation.T @ rotation)
             return SE3(rotation, self.rotation @ other.translation + self.translation)
         return other @ self.rotation.T + self.translation
 

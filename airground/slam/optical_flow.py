@@ -33,11 +33,12 @@ def flow(
     Returns:
         (N, 2) corners in `other` and (N,) which of them were found.
     """
-    if len(pixels) == 0 or min(cv2.mean(image)[0], cv2.mean(other)[0]) < MIN_BRIGHTNESS:
+    brightness, other_brightness = cv2.mean(image)[0], cv2.mean(other)[0]
+    if len(pixels) == 0 or min(brightness, other_brightness) < MIN_BRIGHTNESS:
         return start.copy(), np.zeros(len(pixels), bool)
     moved, status, difference = cv2.calcOpticalFlowPyrLK(
         image,
-        exposed_alike(other, image),
+        brightened(other, brightness / other_brightness),
         np.ascontiguousarray(pixels, np.float32).reshape(-1, 1, 2),
         np.array(start, np.float32).reshape(-1, 1, 2),
         winSize=(window_px, window_px),
@@ -71,9 +72,8 @@ def flow_both_ways(
     return there, found
 
 
-def exposed_alike(image: NDArray[np.uint8], like: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """`image` with the mean brightness of `like`; itself where they hardly differ."""
-    gain = cv2.mean(like)[0] / max(cv2.mean(image)[0], 1.0)
+def brightened(image: NDArray[np.uint8], gain: float) -> NDArray[np.uint8]:
+    """`image` times a gain; itself where that hardly changes it."""
     if abs(gain - 1.0) < 0.02:
         return image
     return cv2.convertScaleAbs(image, alpha=gain).astype(np.uint8, copy=False)
