@@ -15,6 +15,19 @@ COUNT, SUM_A, SUM_G, SUM_AA, SUM_GG, SUM_AG = range(6)
 KEEPS_NAN = {"contract", "reassoc", "arcp", "nsz"}
 
 
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=KEEPS_NAN)
+def mean_height(heights: NDArray[np.float32]) -> tuple[float, int]:
+    """Mean (0 of none) and number of the heights that are not NaN."""
+    total, count = 0.0, 0
+    for i in range(len(heights)):
+        row, filled = heights[i], np.int32(0)
+        for j in range(len(row)):
+            total += np.float64(row[j] if row[j] == row[j] else np.float32(0))
+            filled += np.int32(row[j] == row[j])
+        count += filled
+    return total / max(count, 1), count
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def about_mean(
     heights: NDArray[np.float32], margin: int
@@ -26,20 +39,18 @@ def about_mean(
         margin: Empty cells to put around.
     """
     nx, ny = heights.shape
-    total, count = 0.0, 0
-    for i in range(nx):
-        for j in range(ny):
-            if np.isfinite(heights[i, j]):
-                total += np.float64(heights[i, j])
-                count += 1
-    mean = total / max(count, 1)
+    mean, _ = mean_height(heights)
     centred = np.zeros((nx + 2 * margin, ny + 2 * margin), np.float32)
     mask = np.zeros((nx + 2 * margin, ny + 2 * margin), np.float32)
+    middle, zero, one = np.float32(mean), np.float32(0), np.float32(1)
     for i in range(nx):
+        row = heights[i]
+        line = centred[i + margin, margin : margin + ny]
+        filled = mask[i + margin, margin : margin + ny]
         for j in range(ny):
-            if np.isfinite(heights[i, j]):
-                centred[i + margin, j + margin] = heights[i, j] - np.float32(mean)
-                mask[i + margin, j + margin] = 1
+            inside = row[j] == row[j]
+            line[j] = row[j] - middle if inside else zero
+            filled[j] = one if inside else zero
     return centred, mask, mean
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
-from airground.localization.cost_kernels import KEEPS_NAN
+from airground.localization.cost_kernels import KEEPS_NAN, mean_height
 
 BLOCK = 512
 """Cells that are placed, looked up and added up at a time, so that they stay in the cache."""
@@ -28,7 +28,7 @@ def filled_cells(
         heights: (nx, ny) [m], NaN in holes.
         first_x, first_y: Of cell [0, 0], from the camera [cells].
     """
-    mean, count = _mean(heights)
+    mean, count = mean_height(heights)
     cells = np.empty((3, count), np.float32)
     k = 0
     for i in range(heights.shape[0]):
@@ -50,7 +50,7 @@ def paired(heights: NDArray[np.float32]) -> tuple[NDArray[np.float32], float]:
     Returns:
         NaN in holes and in `MARGIN` cells around; and the mean [m].
     """
-    mean, _ = _mean(heights)
+    mean, _ = mean_height(heights)
     nx, ny = heights.shape
     pairs = np.full((nx + 2 * MARGIN, ny + 2 * MARGIN, 2), np.float32(np.nan), np.float32)
     for i in range(nx):
@@ -60,16 +60,6 @@ def paired(heights: NDArray[np.float32]) -> tuple[NDArray[np.float32], float]:
             at = 2 * (j + MARGIN)
             line[at - 1] = line[at] = row[j] - np.float32(mean)
     return pairs, mean
-
-
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=KEEPS_NAN)
-def _mean(heights: NDArray[np.float32]) -> tuple[float, int]:
-    """Mean (0 of none) and number of the heights that are not NaN."""
-    total, count = 0.0, 0
-    for height in heights.ravel():
-        total += np.float64(height) if height == height else 0.0
-        count += 1 if height == height else 0
-    return total / max(count, 1), count
 
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=KEEPS_NAN)
