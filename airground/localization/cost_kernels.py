@@ -24,7 +24,7 @@ def mean_height(heights: NDArray[np.float32]) -> tuple[float, int]:
         for j in range(len(row)):
             total += np.float64(row[j] if row[j] == row[j] else np.float32(0))
             filled += np.int32(row[j] == row[j])
-        count += filled
+        count += int(filled)
     return total / max(count, 1), count
 
 
