@@ -226,7 +226,7 @@ class Refinement(Section):
     final_distance_m: Positive = 0.05
     """... and than this at the end [m]."""
     trim: Fraction = 0.75
-    """Share of the closest correspondences that is kept."""
+    """Share of the closest correspondences that is kept at the final distance."""
     iterations: Count = 30
     """Most ICP steps in all."""
     min_inliers: Fraction = 0.35

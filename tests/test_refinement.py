@@ -44,6 +44,25 @@ def error(motion):
     return np.linalg.norm(motion @ camera_mav - CAMERA), np.rad2deg(turn)
 
 
+def floor_with_one_box(rng, points_per_m2=2500, noise_m=0.003):
+    """(N, 3) points on 4 x 4 m of floor and on a box of 0.5 x 0.4 x 0.3 m in its middle."""
+
+    def on_rectangle(*sides):
+        area = np.prod([high - low for low, high in sides if high > low])
+        low, high = np.transpose(sides)
+        return rng.uniform(low, high, (round(points_per_m2 * area), 3))
+
+    floor = on_rectangle((-2, 2), (-2, 2), (0, 0))
+    under = (np.abs(floor[:, 0]) < 0.25) & (np.abs(floor[:, 1]) < 0.2)
+    floor[under, 2] = 0.3
+    parts = [floor]
+    for sign in (-1, 1):
+        parts.append(on_rectangle((0.25 * sign, 0.25 * sign), (-0.2, 0.2), (0, 0.3)))
+        parts.append(on_rectangle((-0.25, 0.25), (0.2 * sign, 0.2 * sign), (0, 0.3)))
+    points = np.concatenate(parts)
+    return points + rng.normal(0, noise_m, points.shape)
+
+
 @pytest.fixture(scope="module")
 def heap():
     world = box_heap(1)
@@ -70,6 +89,20 @@ def test_paper_comes_back_from_nearby(heap):
         metres, degrees = error(alignment.T_ground_mav)
         assert metres < 0.01
         assert degrees < 0.2
+
+
+@pytest.mark.parametrize("start", [(0.1, 0.05, 2.0), (0.1, -0.1, -2.0), (-0.15, 0.1, 2.0)])
+def test_one_box_on_a_large_floor_is_enough(start):
+    """Most points lie on the floor wherever they are put; the box alone says where they belong."""
+    rng = np.random.default_rng(4)
+    settings = Config().refinement
+    source, target = (make_surfels(floor_with_one_box(rng), settings.voxel_m) for _ in range(2))
+    x, y, heading_deg = start
+    fit = point_to_plane_icp(
+        source.points, target, SE3.from_heading(np.deg2rad(heading_deg), (x, y, 0)), settings
+    )
+    assert np.linalg.norm(fit.T_target_source.translation) < 0.005
+    assert np.rad2deg(fit.T_target_source.angle()) < 1.0
 
 
 def test_same_input_same_output(heap):

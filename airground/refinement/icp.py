@@ -1,4 +1,4 @@
-"""Point-to-plane ICP with trimming and a falling correspondence distance (Sec. VII)."""
+"""Point-to-plane ICP with a falling correspondence distance, trimmed at last (Sec. VII)."""
 
 from __future__ import annotations
 
@@ -52,13 +52,15 @@ def point_to_plane_icp(source: NDArray, target: Surfels, start: SE3, config: Ref
         # While the distance is still large, a part of the points says as much as all.
         moved = motion @ (source[::SPARSE] if distance > SPARSE_ABOVE_M else source)
         index, squared = target.nearest(moved)
-        keep = _closest(squared, distance, config.trim)
+        at_final = distance <= config.final_distance_m * 1.001
+        # Nothing is trimmed before: on a floor with one box, the box is what lies farthest off
+        # at first, and all that tells where to move.
+        keep = _closest(squared, distance, config.trim if at_final else 1.0)
         used = int(keep.sum())
         if used < MIN_CORRESPONDENCES:
             return Fit(motion, False, used)
         step = _solve(moved[keep], target.points[index[keep]], target.normals[index[keep]])
         motion = step @ motion
-        at_final = distance <= config.final_distance_m * 1.001
         if at_final and np.abs(step @ moved[keep] - moved[keep]).max() < SETTLED_M:
             return Fit(motion, True, used)
         distance = max(distance * factor, config.final_distance_m)
