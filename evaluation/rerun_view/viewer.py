@@ -24,6 +24,8 @@ from airground.errors import AirgroundError, InputError
 LOOPBACK = "127.0.0.1"
 START_S = 30.0
 """A viewer that does not listen by then will not."""
+STAY_S = 3.0
+"""A viewer listens before it draws: one that cannot draw here ends within this time."""
 STOP_S = 5.0
 
 
@@ -94,11 +96,12 @@ def window(ports: Ports, *options: str) -> Iterator[subprocess.Popen[bytes]]:
     """A viewer that waits for what a pipeline sends, and stays open after the block.
 
     Raises:
-        AirgroundError: It does not start.
+        AirgroundError: It does not start, or cannot draw.
     """
     viewer = _start(*options, "--expect-data-soon", *_listening(ports))
     try:
         _wait_until_open(viewer, ports.data)
+        _see_it_stay(viewer)
         yield viewer
     except BaseException:
         _stop(viewer)
@@ -189,6 +192,17 @@ def _wait_until_open(process: subprocess.Popen[bytes], port: int) -> None:
                 return
         time.sleep(0.05)
     raise AirgroundError(f"rerun's viewer does not listen on port {port} after {START_S:.0f} s")
+
+
+def _see_it_stay(process: subprocess.Popen[bytes]) -> None:
+    try:
+        code = process.wait(STAY_S)
+    except subprocess.TimeoutExpired:
+        return
+    raise AirgroundError(
+        f"rerun's viewer ended with exit code {code} when it was to draw; it needs a graphics "
+        "driver with Vulkan (mesa-vulkan-drivers where there is no graphics card)"
+    )
 
 
 def _carry_out(*words: str) -> None:

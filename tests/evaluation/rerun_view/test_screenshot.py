@@ -38,7 +38,7 @@ def headless(ports: viewer.Ports, *files: str) -> Iterator[ViewerClient]:
                 process.terminate()
                 process.wait()
     except AirgroundError as error:
-        pytest.skip(f"rerun's viewer cannot draw here (mesa-vulkan-drivers?): {error}")
+        pytest.skip(f"rerun's viewer cannot draw here: {error}")
 
 
 def patiently(ask: Callable[[], Answer]) -> Answer:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from rerun.chunk import RrdReader
 
-from airground.errors import InputError
+from airground.errors import AirgroundError, InputError
 from evaluation import cli
 from evaluation.commands.look import LookWords
 from evaluation.commands.view import rerun_file
@@ -159,3 +159,38 @@ def test_words_without_a_meaning_are_refused(
 ) -> None:
     with pytest.raises(InputError, match=complaint):
         words.check_look_words(alone, realtime)
+
+
+def stand_in(folder: Path, then: str) -> Path:
+    """A program in place of rerun's that listens on its --port, and then does something."""
+    file = folder / "rerun"
+    file.write_text(
+        f"#!{sys.executable}\n"
+        "import socket, sys, time\n"
+        "port = int(sys.argv[sys.argv.index('--port') + 1])\n"
+        "listening = socket.create_server(('127.0.0.1', port))\n"
+        f"{then}\n"
+    )
+    file.chmod(0o755)
+    return file
+
+
+def test_a_viewer_that_listens_but_cannot_draw_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    program = stand_in(tmp_path, "time.sleep(0.3); sys.exit(102)")
+    monkeypatch.setenv("RERUN_CLI_PATH", str(program))
+    with (
+        pytest.raises(AirgroundError, match=r"exit code 102 .* Vulkan"),
+        viewer.window(viewer.free_ports()),
+    ):
+        pytest.fail("it does not draw")
+
+
+def test_a_viewer_that_stays_is_let_be(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("RERUN_CLI_PATH", str(stand_in(tmp_path, "time.sleep(60)")))
+    monkeypatch.setattr(viewer, "STAY_S", 0.2)
+    with viewer.window(viewer.free_ports()) as process:
+        assert process.poll() is None
+        process.terminate()
+        process.wait()
