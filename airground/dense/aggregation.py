@@ -100,7 +100,7 @@ def _slide_down(
 @njit(cache=True, error_model="numpy")
 def _count_views(limits: NDArray, count: NDArray, sign: int) -> None:
     """Add to `count` (sign 1), or take away (-1), how many views cover each pixel of a row."""
-    signed, views = np.int16(sign), np.int16(sign * len(limits))
+    signed, views = np.int32(sign), np.int32(sign * len(limits))
     for x in range(len(count)):
         count[x] += views
     # Most views cover most of a row: take away what each does not.
@@ -158,8 +158,8 @@ def box_mean(
         begin = task * ROWS_A_TASK
         end = min(begin + ROWS_A_TASK, height)
         sums = np.zeros((2, planes, padded), np.int32)
-        counts = np.zeros((2, planes, padded), np.int16)
-        total, count = np.empty((2, width), np.int32), np.empty((2, width), np.int16)
+        counts = np.zeros((2, planes, padded), np.int32)
+        total, count = np.empty((2, width), np.int32), np.empty((2, width), np.int32)
         block = np.empty((planes, width), np.uint16)
         for y in range(begin - 2 * radius, end):
             # The window ends `radius` rows further down; that of the row before began `radius`
@@ -189,7 +189,7 @@ def _mean(
 ) -> None:
     """Sum over number of samples, as stored."""
     for x in range(len(out)):
-        value = factor * np.float32(total[x]) / np.float32(max(count[x], np.int16(1)))
+        value = factor * np.float32(total[x]) / np.float32(max(count[x], np.int32(1)))
         out[x] = np.uint16(np.int32(value if count[x] > 0 else ceiling))
 
 
@@ -203,7 +203,7 @@ def _mean_of_sides(
     out: NDArray,
 ) -> None:
     """The mean over both sides, or over the better one plus a penalty, whichever is lower."""
-    one = np.int16(1)
+    one = np.int32(1)
     total0, total1, count0, count1 = total[0], total[1], count[0], count[1]
     for x in range(len(out)):
         n0, n1 = count0[x], count1[x]

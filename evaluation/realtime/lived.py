@@ -21,7 +21,7 @@ class Playback:
         waiting_frames: How many images may wait before each tracker, 8 being a quarter of a
             second at 30 Hz.
         frames_under_way: How many tracked frames of each robot may wait before the mapper:
-            five seconds at 30 Hz, some 370 MiB when all of it is full.
+            five seconds at 30 Hz, some 360 MiB when all of it is full.
         radio: What lies between the MAV and the ground robot; None for one computer.
         patience_s: How long the mapper waits for a robot that is silent.
     """

@@ -149,6 +149,16 @@ def test_aggregation_divides_by_the_samples_that_exist() -> None:
         assert abs(int(single[y, x, p]) - sides[1] * MEAN_SCALE) <= 1.01
 
 
+def test_many_views_in_a_large_window_are_all_counted() -> None:
+    height, planes, width, views, each = 50, 2, 60, 20, 8.0
+    costs = np.full((height, planes, width), views * each * COST_SCALE, np.uint16)
+    whole = np.broadcast_to(np.array([0, width], np.int16), (height, planes, 2))
+    volume = CostVolume(costs)
+    volume.limits = [whole] * views
+    mean = aggregate([volume], 47, 40.0, 1.0, Workspace())
+    np.testing.assert_allclose(mean, each * MEAN_SCALE, atol=1.01)
+
+
 def test_window_must_have_a_middle() -> None:
     empty = CostVolume(np.zeros((4, 3, 5), np.uint16))
     with pytest.raises(ValueError, match="odd"):
