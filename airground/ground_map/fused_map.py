@@ -14,7 +14,6 @@ from dataclasses import replace
 
 import numpy as np
 import open3d as o3d
-from numpy.typing import NDArray
 
 from airground.config import GroundMapping
 from airground.core.camera import PinholeCamera
@@ -23,10 +22,10 @@ from airground.core.messages import GroundImage
 from airground.core.se3 import SE3, rotation_angle
 from airground.core.trajectory import Trajectory
 from airground.ground_map.keyframe import GroundKeyframe
+from airground.ground_map.surface_points import BLOCK, BlockedField, surface_points
 
-_BLOCK = 8
+_ATTRIBUTES = ("tsdf", "weight", "color")
 _FIRST_BLOCKS = 10_000
-_CUBE_M = 1e-4
 
 
 class GroundMap:
@@ -107,11 +106,11 @@ class GroundMap:
 
     def _empty_grid(self) -> o3d.t.geometry.VoxelBlockGrid:
         return o3d.t.geometry.VoxelBlockGrid(
-            attr_names=("tsdf", "weight", "color"),
+            attr_names=_ATTRIBUTES,
             attr_dtypes=(o3d.core.float32,) * 3,
             attr_channels=[o3d.core.SizeVector([n]) for n in (1, 1, 3)],
             voxel_size=self._config.voxel_m,
-            block_resolution=_BLOCK,
+            block_resolution=BLOCK,
             block_count=_FIRST_BLOCKS,
         )
 
@@ -133,34 +132,19 @@ class GroundMap:
         self._grid.integrate(blocks, depth, colour, self._intrinsics, T_camera_ground, *reach)
 
     def _extracted(self) -> PointCloud:
-        if self._grid.hashmap().size() == 0:
-            return PointCloud.empty()
-        extracted = self._grid.extract_point_cloud(self._config.min_keyframes - 0.5)
-        if extracted.is_empty():
-            return PointCloud.empty()
-        points = extracted.point.positions.numpy()
-        # Blocks come in the order of a parallel hash map, another each time.
-        order = lasting_order(points)
-        colours = np.rint(extracted.point.colors.numpy()[order]).clip(0, 255)
-        return PointCloud(
-            points[order], colours.astype(np.uint8), extracted.point.normals.numpy()[order]
+        """The points of the zero level; in the same order whatever the threads did."""
+        blocks = self._grid.hashmap()
+        rows = blocks.active_buf_indices().numpy()
+        tsdf, weight, colour = (self._grid.attribute(name).numpy() for name in _ATTRIBUTES)
+        field = BlockedField(
+            blocks.key_tensor().numpy()[rows],
+            rows.astype(np.int32),
+            tsdf[..., 0],
+            weight[..., 0],
+            colour,
+            self._config.voxel_m,
         )
-
-
-def lasting_order(points: NDArray[np.float32]) -> NDArray[np.int64]:
-    """(N,) an order of different points (N, 3) that is the same however they were shuffled.
-
-    By the small cube that each lies in, in one word, which sorts many times faster than three
-    coordinates; the few that share a word, by the coordinates.
-    """
-    x, y, z = np.floor(points.T.astype(np.float64) / _CUBE_M).astype(np.int64)
-    word = (z << 42) + (y << 21) + x
-    order = np.argsort(word)
-    same = np.diff(word[order]) == 0
-    shared = np.flatnonzero(np.append(same, False) | np.append(False, same))
-    rivals = order[shared]
-    order[shared] = rivals[np.lexsort((*points[rivals].T, word[rivals]))]
-    return order
+        return surface_points(field, self._config.min_keyframes - 0.5)
 
 
 def _corrected(keyframe: GroundKeyframe, trajectory: Trajectory) -> GroundKeyframe:

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from airground.config import GroundMapping
 from airground.core.camera import PinholeCamera
@@ -11,7 +9,6 @@ from airground.core.messages import GroundImage
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.ground_map import GroundMap
-from airground.ground_map.fused_map import lasting_order
 from airground.ground_map.keyframe import GroundKeyframe
 
 CAMERA = PinholeCamera(160, 120, 130.0, 130.0, 79.5, 59.5)
@@ -187,19 +184,3 @@ def test_a_keyframe_without_depth_adds_nothing() -> None:
     ground_map.add(wall_image(2.007), SE3.identity())
     assert ground_map.keyframes == 2
     assert len(ground_map.cloud()) > 100
-
-
-@given(
-    spread_m=st.sampled_from([1e-5, 1e-4, 1.0, 1e4]),
-    n=st.integers(0, 60),
-    seed=st.integers(0, 1000),
-)
-def test_points_keep_their_order_however_they_were_shuffled(
-    spread_m: float, n: int, seed: int
-) -> None:
-    rng = np.random.default_rng(seed)
-    points = np.unique(rng.uniform(-spread_m, spread_m, (n, 3)).astype(np.float32), axis=0)
-    shuffled = rng.permutation(points)
-    once, again = points[lasting_order(points)], shuffled[lasting_order(shuffled)]
-    assert np.array_equal(once, again)
-    assert sorted(map(tuple, once)) == sorted(map(tuple, points))
