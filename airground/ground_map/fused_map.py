@@ -22,9 +22,13 @@ from airground.core.messages import GroundImage
 from airground.core.se3 import SE3, rotation_angle
 from airground.core.trajectory import Trajectory
 from airground.ground_map.keyframe import GroundKeyframe
-from airground.ground_map.surface_points import BLOCK, BlockedField, surface_points
+from airground.ground_map.surface_points import (
+    ATTRIBUTES,
+    BLOCK,
+    BlockedField,
+    surface_points,
+)
 
-_ATTRIBUTES = ("tsdf", "weight", "color")
 _FIRST_BLOCKS = 10_000
 
 
@@ -101,12 +105,16 @@ class GroundMap:
         if self._cloud is None:
             for keyframe in self._keyframes[self._fused :]:
                 self._fuse(keyframe)
-            self._cloud = self._extracted()
+            self._cloud = surface_points(self.field(), self._config.min_keyframes - 0.5)
         return self._cloud
+
+    def field(self) -> BlockedField:
+        """The distance field so far; fusing further keyframes changes it."""
+        return BlockedField.of(self._grid, self._config.voxel_m)
 
     def _empty_grid(self) -> o3d.t.geometry.VoxelBlockGrid:
         return o3d.t.geometry.VoxelBlockGrid(
-            attr_names=_ATTRIBUTES,
+            attr_names=ATTRIBUTES,
             attr_dtypes=(o3d.core.float32,) * 3,
             attr_channels=[o3d.core.SizeVector([n]) for n in (1, 1, 3)],
             voxel_size=self._config.voxel_m,
@@ -130,21 +138,6 @@ class GroundMap:
             depth, self._intrinsics, T_camera_ground, *reach
         )
         self._grid.integrate(blocks, depth, colour, self._intrinsics, T_camera_ground, *reach)
-
-    def _extracted(self) -> PointCloud:
-        """The points of the zero level; in the same order whatever the threads did."""
-        blocks = self._grid.hashmap()
-        rows = blocks.active_buf_indices().numpy()
-        tsdf, weight, colour = (self._grid.attribute(name).numpy() for name in _ATTRIBUTES)
-        field = BlockedField(
-            blocks.key_tensor().numpy()[rows],
-            rows.astype(np.int32),
-            tsdf[..., 0],
-            weight[..., 0],
-            colour,
-            self._config.voxel_m,
-        )
-        return surface_points(field, self._config.min_keyframes - 0.5)
 
 
 def _corrected(keyframe: GroundKeyframe, trajectory: Trajectory) -> GroundKeyframe:

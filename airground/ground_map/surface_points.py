@@ -11,11 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import open3d as o3d
 from numba import njit, prange
 from numpy.typing import NDArray
 
 from airground.core.cloud import PointCloud
 
+ATTRIBUTES = ("tsdf", "weight", "color")
+"""What a voxel holds, as Open3D calls it."""
 BLOCK = 8
 """Voxels along each side of a block."""
 BEFORE, BEHIND = 1, 2
@@ -48,6 +51,22 @@ class BlockedField:
     weight: NDArray[np.float32]
     colour: NDArray[np.float32]
     voxel_m: float
+
+    @classmethod
+    def of(cls, grid: o3d.t.geometry.VoxelBlockGrid, voxel_m: float) -> BlockedField:
+        """What a grid with attributes tsdf, weight and color holds now; no copy."""
+        rows = grid.hashmap().active_buf_indices().numpy()
+        tsdf, weight, colour = (grid.attribute(name).numpy() for name in ATTRIBUTES)
+        places = grid.hashmap().key_tensor().numpy()[rows]
+        return cls(places, rows.astype(np.int32), tsdf[..., 0], weight[..., 0], colour, voxel_m)
+
+    def copy(self) -> BlockedField:
+        """The same in memory of its own, which nobody fuses into any more."""
+        tsdf, weight, colour = (
+            values[self.rows] for values in (self.tsdf, self.weight, self.colour)
+        )
+        rows = np.arange(len(self.rows), dtype=np.int32)
+        return BlockedField(self.places.copy(), rows, tsdf, weight, colour, self.voxel_m)
 
 
 def surface_points(field: BlockedField, min_weight: float) -> PointCloud:

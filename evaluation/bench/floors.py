@@ -98,6 +98,12 @@ def height_map(points: int, cells: int) -> Floor:
     return Floor(POINT * points + 2 * FLOAT * cells, 6 * points)
 
 
+def ground_surface(voxels: int, points: int) -> Floor:
+    """Distance and weight of every voxel once, three comparisons; a point and its normal each."""
+    colours = 3
+    return Floor(2 * FLOAT * voxels + (2 * POINT + colours) * points, 3 * voxels + 40 * points)
+
+
 def added_points(points: int) -> Floor:
     """Points moved, and written beside those that were there."""
     return Floor(2 * POINT * points, 18 * points)

@@ -12,6 +12,7 @@ from airground.config import Config, paper
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
 from airground.ground_map import GroundMap
+from airground.ground_map.surface_points import surface_points
 from airground.pipeline import moved
 from airground.refinement import refine
 from evaluation.bench import floors
@@ -75,6 +76,18 @@ def ground_map(material: Material) -> Work:
     built = GroundMap(material.ground_camera, material.config.ground_mapping)
     height, width = image.depth.shape
     return Work(lambda: built.add(image, pose), size=f"{width} x {height} px")
+
+
+def ground_surface(material: Material) -> Work:
+    """The ground map's points, colours and normals from its distance field."""
+    field = material.ground_field
+    least = material.config.ground_mapping.min_keyframes - 0.5
+    points = len(surface_points(field, least))
+    return Work(
+        lambda: surface_points(field, least),
+        size=f"{len(field.rows)} blocks, {points} points",
+        floor=floors.ground_surface(field.tsdf.size, points),
+    )
 
 
 def read_grey(material: Material) -> Work:

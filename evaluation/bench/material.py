@@ -30,6 +30,8 @@ from airground.core.se3 import SE3
 from airground.core.surface import AerialSurface, DepthMap
 from airground.dense.view_selection import PosedImage
 from airground.errors import InputError
+from airground.ground_map import GroundMap
+from airground.ground_map.surface_points import BlockedField
 from airground.io.recording import Recording
 from airground.pipeline import Pipeline, Sighting, sight
 from evaluation.bench.memory import resident_mib
@@ -61,6 +63,7 @@ class Material:
         sighting: The surface, and the ground robot's map by then.
         T_ground_mav: As it was aligned.
         ground_image: The ground robot's newest image by then.
+        ground_field: The distance field that its map's points came from.
     """
 
     recording: Recording
@@ -73,6 +76,7 @@ class Material:
     sighting: Sighting
     T_ground_mav: SE3
     ground_image: GroundImage
+    ground_field: BlockedField
 
     @property
     def surface(self) -> AerialSurface:
@@ -237,7 +241,13 @@ class _Gathering:
             sighting,
             T_ground_mav,
             self.recording.ground_image_at(sighting.ground_stamp_ns),
+            self._ground_field(),
         )
+
+    def _ground_field(self) -> BlockedField:
+        ground_map = self.pipeline.mapping.ground_map
+        assert isinstance(ground_map, GroundMap)
+        return ground_map.field().copy()
 
     def _posed(self, stamp_ns: int) -> PosedImage:
         image = self.recording.mav_image_at(stamp_ns).image

@@ -17,13 +17,13 @@ from airground.core.surface import DepthMap
 from airground.dense.plane_sweep import halved, inverse_depth_planes
 from airground.dense.scene_extent import scene_extent
 from airground.dense.volume import Volume
+from airground.ground_map.surface_points import ATTRIBUTES, BLOCK
 from evaluation.bench.dense_rows import with_paper_planes
 from evaluation.bench.localization_rows import Maps, paper_sized
 from evaluation.bench.map_rows import start_of
 from evaluation.bench.material import Material
 from evaluation.bench.row import Work
 
-BLOCK = 8
 FIRST_BLOCKS = 20_000
 NEIGHBOURS = 10
 
@@ -150,6 +150,25 @@ class _Grid:
 
     def extract(self) -> o3d.t.geometry.PointCloud:
         return self._grid.extract_point_cloud(self._weight - 0.5)
+
+
+def extract_ground(material: Material) -> Work:
+    """Open3D: the points of its own voxel block grid, which holds the same field."""
+    field = material.ground_field
+    grid = o3d.t.geometry.VoxelBlockGrid(
+        attr_names=ATTRIBUTES,
+        attr_dtypes=(o3d.core.float32,) * 3,
+        attr_channels=[o3d.core.SizeVector([n]) for n in (1, 1, 3)],
+        voxel_size=field.voxel_m,
+        block_resolution=BLOCK,
+        block_count=FIRST_BLOCKS,
+    )
+    rows, _ = grid.hashmap().activate(o3d.core.Tensor.from_numpy(field.places))
+    filled = field.tsdf[..., None], field.weight[..., None], field.colour
+    for name, values in zip(ATTRIBUTES, filled, strict=True):
+        grid.attribute(name).numpy()[rows.numpy()] = values[field.rows]
+    least = material.config.ground_mapping.min_keyframes - 0.5
+    return Work(lambda: grid.extract_point_cloud(least))
 
 
 def open3d_icp(material: Material) -> Work:

@@ -21,6 +21,19 @@ def _ours(metric: str, title: str, group: str) -> TimedStage:
 ROWS = (
     Row(of_table("ground_map"), map_rows.ground_map),
     Row(
+        _ours("ground_surface", "Points of the ground map", "Egomotion"),
+        map_rows.ground_surface,
+        None,
+        (
+            Peer(
+                "Open3D",
+                "open3d",
+                "in no lasting order, and without a surface that lies on voxels exactly",
+                peers.extract_ground,
+            ),
+        ),
+    ),
+    Row(
         of_table("add_frame"),
         dense_rows.add_frame,
         9,

@@ -52,12 +52,7 @@ def fused_steps(seed: int) -> o3d.t.geometry.VoxelBlockGrid:
 
 
 def field_of(grid: o3d.t.geometry.VoxelBlockGrid) -> BlockedField:
-    rows = grid.hashmap().active_buf_indices().numpy()
-    tsdf, weight, colour = (grid.attribute(name).numpy() for name in ("tsdf", "weight", "color"))
-    places = grid.hashmap().key_tensor().numpy()[rows]
-    return BlockedField(
-        places, rows.astype(np.int32), tsdf[..., 0], weight[..., 0], colour, VOXEL_M
-    )
+    return BlockedField.of(grid, VOXEL_M)
 
 
 @pytest.mark.kernel

@@ -13,6 +13,7 @@ from airground.core.messages import GroundImage
 from airground.core.se3 import SE3
 from airground.core.surface import AerialSurface, DepthMap
 from airground.dense.view_selection import PosedImage
+from airground.ground_map import GroundMap
 from airground.io.recording import Recording
 from airground.pipeline import Sighting, moved
 from evaluation.bench.material import Material
@@ -52,6 +53,10 @@ def make_material(folder: Path) -> Material:
     T_ground_camera = T_GROUND_MAV @ above
     depth = world.depth(WIDE_CAMERA, above).astype(np.float32)
     colour = np.full((*depth.shape, 3), 120, np.uint8)
+    image = GroundImage(FRAMES, colour, depth)
+    ground_map = GroundMap(WIDE_CAMERA, CONFIG.ground_mapping)
+    for _ in range(CONFIG.ground_mapping.min_keyframes):
+        ground_map.add(image, T_ground_camera)
     return Material(
         recording=Recording.open(write_recording(folder)),
         config=CONFIG,
@@ -70,7 +75,8 @@ def make_material(folder: Path) -> Material:
             T_GROUND_MAV.heading(),
         ),
         T_ground_mav=T_GROUND_MAV,
-        ground_image=GroundImage(FRAMES, colour, depth),
+        ground_image=image,
+        ground_field=ground_map.field(),
     )
 
 

@@ -215,3 +215,11 @@ def test_unknown_rows_are_named() -> None:
         checked_names(["cost_map", "nonsense"])
     assert checked_names([]) == NAMES
     assert checked_names(["icp", "mono_slam"]) == ("mono_slam", "icp")
+
+
+def test_our_ground_map_has_all_points_that_open3d_finds(material: Material) -> None:
+    ours = map_rows.ground_surface(material).run()
+    theirs = peers.extract_ground(material).run().point.positions.numpy()
+    # The floor lies on the voxels exactly: Open3D leaves it out.
+    assert len(ours) > len(theirs) > 1000
+    assert KDTree(ours.points).query(theirs)[0].max() == 0
