@@ -22,6 +22,7 @@ from evaluation.protocol.trials import (
     sequence_starts,
     trial_sightings,
 )
+from evaluation.protocol.wide_search import add_wide_searches
 from evaluation.results.row_writer import RowWriter
 from evaluation.results.table import Row
 from evaluation.runs.timing import STAGE_OF
@@ -118,14 +119,15 @@ def _measured(recording: Recording, task: Task, stranger: GroundPass | None) -> 
         _add_surfaces(out, maps, truth)
         _add_sequences(out, maps, truth, setup, task)
         _add_trials(out, maps, truth, setup, task)
+        seed = (task.seed, task.flight)
+        widely = task.protocol.wide_searches
+        add_wide_searches(out, maps.sightings, truth, setup.config, seed, widely)
         if task.budget and setup is task.setups[0]:
-            add_error_budget(out, recording, truth, setup, maps, (task.seed, task.flight))
+            add_error_budget(out, recording, truth, setup, maps, seed)
         if task.baselines and task.protocol.baselines and setup is task.setups[0]:
             counts = (task.protocol.trials, task.protocol.baselines)
-            seed = (task.seed, task.flight)
             add_baselines(out, recording, truth, setup.config, maps, seed, counts)
         if task.negatives and setup is task.setups[0]:
-            seed = (task.seed, task.flight)
             add_negatives(out, maps, stranger, truth, setup.config, seed, task.protocol)
         parts.append(out.rows)
     showcase = None

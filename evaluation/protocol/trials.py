@@ -35,12 +35,14 @@ class Protocol:
         trials: Refinements from a noisy start, likewise.
         baselines: How many of these trials every baseline is tried on as well.
         sequence_length: Aerial maps in a sequence.
+        wide_searches: Aerial maps that are looked for one by one in a wider region.
     """
 
     sequences: int = 7
     trials: int = 12
     baselines: int = 0
     sequence_length: int = SEQUENCE_LENGTH
+    wide_searches: int = 0
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from evaluation.protocol import wide_search
 from evaluation.regression import samples
 from evaluation.regression.samples import Samples, Take
 from evaluation.results.table import ResultTable
@@ -176,6 +177,25 @@ WATCHED = (
         "particles' spread, map 1",
         "sequence",
         samples.localization("spread_m", 1),
+    ),
+    # How clearly the true place wins where most places hold little of the map.
+    Metric(
+        "wide_lead",
+        "true place's lead, wide",
+        "",
+        "higher",
+        "surface",
+        samples.values(wide_search.STAGE, "lead"),
+        failure=-math.inf,
+        matters=0.05,
+        why="a twentieth: less helps nobody",
+        relative=True,
+    ),
+    _success(
+        "wide_within_50cm",
+        "within 0.5 m, wide search",
+        "surface",
+        samples.widely_located(0.50),
     ),
     _success("within_50cm_1", "within 0.5 m, map 1", "sequence", samples.located(1, 0.50)),
     _success("within_25cm_4", "within 0.25 m, map 4", "sequence", samples.located(4, 0.25)),

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from evaluation.protocol import wide_search
 from evaluation.results.table import SEQUENCE_KEYS, TRIAL_KEYS, ResultTable
 
 LOCATED_M = 0.25
@@ -86,6 +87,12 @@ def localization(metric: str, iteration: int) -> Take:
 def located(iteration: int, limit_m: float) -> Take:
     """1 where the error is within the limit, else 0."""
     error = localization("error_m", iteration)
+    return lambda table: (error(table) <= limit_m).astype(float)
+
+
+def widely_located(limit_m: float) -> Take:
+    """1 where a wide search ended within the limit, else 0."""
+    error = values(wide_search.STAGE, "error_m")
     return lambda table: (error(table) <= limit_m).astype(float)
 
 

@@ -55,7 +55,7 @@ SUITES = {
         # `flat` holds nothing to find: whoever claims a place there is wrong.
         (Flights("tiny", 12, 20.0), Flights("flat", 1, 24.0)),
         # Verdicts look at aerial maps 1 and 4.
-        Protocol(sequences=3, trials=4, sequence_length=4),
+        Protocol(sequences=3, trials=4, sequence_length=4, wide_searches=6),
     ),
 }
 

@@ -87,6 +87,9 @@ def _flight(
         add("refinement", "after_translation_m", error("after_translation_m"), trial=trial)
         add("refinement", "after_rotation_deg", error("after_rotation_deg"), trial=trial)
         add("refinement", "accepted", 1.0, trial=trial)
+    for surface in range(SURFACES):
+        add("wide_search", "error_m", error("error_m"), trial=surface)
+        add("wide_search", "lead", rng.uniform(0.1, 0.3), trial=surface)
     return rows
 
 
