@@ -113,11 +113,12 @@ def _legend(figure: Figure, axes: Axes, report: BenchReport) -> None:
 
 
 def _conditions(report: BenchReport) -> str:
+    """Two lines: a processor's long name would run into the heading beside the second."""
     machine = report.machine
     others = machine.other_cores
     busy = "unknown" if others is None else f"{others:.1f} cores"
     return (
-        f"{machine.cpu}, {machine.cores} cores; busy with other programs meanwhile: {busy}; "
+        f"{machine.cpu}, {machine.cores} cores\nbusy with other programs meanwhile: {busy}; "
         f"{report.recording.scene}, {report.git_revision}"
     )
 
