@@ -75,14 +75,18 @@ def test_another_schema_is_refused(key: str, value: object, complaint: str, tmp_
         Accepted.read(path)
 
 
-def test_a_missing_metric_is_named(tmp_path: Path) -> None:
+def test_figures_of_a_version_that_watches_other_metrics_are_only_replaced(tmp_path: Path) -> None:
     path = tmp_path / "accepted.json"
     Accepted.of(measured_with_failures(), "abc123", "first", None, DAY).write(path)
     made = json.loads(path.read_text())
     del made["metrics"]["located"]
     path.write_text(json.dumps(made))
+    before = Accepted.read(path)
     with pytest.raises(InputError, match="metric 'located' is not on both lists"):
-        Accepted.read(path)
+        before.measured()
+    after = Accepted.of(measured_with_failures(), "def456", "a metric more", before, DAY)
+    assert [one.reason for one in after.history] == ["first", "a metric more"]
+    assert after.measured() == measured_with_failures()
 
 
 @pytest.mark.parametrize("content", [None, "no JSON", '{"schema": 1}'])
