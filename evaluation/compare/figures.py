@@ -18,7 +18,13 @@ from evaluation.report.published import TABLE_I
 from evaluation.results.table import ResultTable
 from evaluation.showcase.figures import ReportFigure
 
-_UNITS = {"m": ("mm", 1e3), "deg": ("deg", 1.0), "count": ("", 1.0), "": ("points of %", 100.0)}
+_UNITS = {
+    "m": ("mm", 1e3),
+    "deg": ("deg", 1.0),
+    "count": ("", 1.0),
+    "cost": ("", 1.0),
+    "": ("points of %", 100.0),
+}
 """How a change in a metric's unit is drawn."""
 
 

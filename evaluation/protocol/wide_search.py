@@ -27,6 +27,8 @@ WIDER = 2.0
 """So many times as far around the ground robot as the pipeline would search."""
 HERE_M, ELSEWHERE_M = 0.25, 0.5
 """Places this close to the true one are the same place, and beyond this another."""
+WORST = 2.0
+"""Cost of heights that correlate by -1; more than the product's other cost ever is [m^2]."""
 
 
 def add_wide_searches(
@@ -65,7 +67,7 @@ def add_wide_searches(
 def lead_of(cost_map: CostMap, place: NDArray) -> float:
     """The lowest cost elsewhere minus that at the true place, in units of the cost.
 
-    Positive where the true place wins; NaN where it has no cost, infinite where only it has.
+    Positive where the true place wins. Where no place has a cost, `WORST` stands for it.
 
     Args:
         cost_map: Of one aerial map.
@@ -73,7 +75,7 @@ def lead_of(cost_map: CostMap, place: NDArray) -> float:
     """
     cells = np.indices(cost_map.costs.shape) / cost_map.cells_per_m
     away = np.hypot(*(cells + (cost_map.origin - place)[:, None, None]))
-    costs = np.nan_to_num(cost_map.costs, nan=np.inf)
-    here = costs[away <= HERE_M].min(initial=np.inf)
-    elsewhere = costs[away > ELSEWHERE_M].min(initial=np.inf)
-    return float(elsewhere - here) if np.isfinite(here) else float("nan")
+    costs = np.nan_to_num(cost_map.costs, nan=WORST)
+    here = costs[away <= HERE_M].min(initial=WORST)
+    elsewhere = costs[away > ELSEWHERE_M].min(initial=WORST)
+    return float(elsewhere - here)

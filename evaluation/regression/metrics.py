@@ -25,7 +25,7 @@ class Metric:
     Attributes:
         name: Its key in files.
         title: What a reader sees.
-        unit: "m", "deg", "count", or "" for a share.
+        unit: "m", "deg", "count", "cost" (a height map's), or "" for a share.
         better: Which direction is.
         each: What one value belongs to.
         take: Finds the values in a table of results.
@@ -182,11 +182,11 @@ WATCHED = (
     Metric(
         "wide_lead",
         "true place's lead, wide",
-        "",
+        "cost",
         "higher",
         "surface",
         samples.values(wide_search.STAGE, "lead"),
-        failure=-math.inf,
+        failure=-wide_search.WORST,
         matters=0.05,
         why="a twentieth: less helps nobody",
         relative=True,

@@ -148,6 +148,8 @@ def _number(metric: Metric, value: float, sign: str) -> str:
         return f"{value:{sign}.3f}°"
     if metric.unit == "count":
         return f"{value:{sign}.1f}"
+    if metric.unit == "cost":
+        return f"{value:{sign}.3f}"
     return f"{100 * value:{sign}.1f} %"
 
 

@@ -11,7 +11,7 @@ from airground.core.events import CostMapComputed
 from airground.localization.particle_filter import MonteCarloLocalizer
 from airground.pipeline import locate
 from evaluation.protocol import wide_search
-from evaluation.protocol.wide_search import STAGE, add_wide_searches, lead_of
+from evaluation.protocol.wide_search import STAGE, WORST, add_wide_searches, lead_of
 from evaluation.results.row_writer import RowWriter
 from evaluation.results.table import ResultTable
 from tests.evaluation.regression.test_sabotage import CONDITION, Flown, fly
@@ -45,9 +45,9 @@ def test_neighbours_of_the_true_place_are_no_rivals() -> None:
     assert lead_of(cost_map({(13, 20): 0.2}), PLACE) == pytest.approx(-0.8)
 
 
-def test_places_without_a_cost_neither_win_nor_lose() -> None:
-    assert np.isnan(lead_of(cost_map({(2, 3): 0.4}, fill=np.nan), PLACE))
-    assert lead_of(cost_map({(10, 20): 0.4}, fill=np.nan), PLACE) == np.inf
+def test_places_without_a_cost_are_the_worst() -> None:
+    assert lead_of(cost_map({(2, 3): 0.4}, fill=np.nan), PLACE) == pytest.approx(0.4 - WORST)
+    assert lead_of(cost_map({(10, 20): 0.4}, fill=np.nan), PLACE) == pytest.approx(WORST - 0.4)
 
 
 def test_each_aerial_map_is_found_by_itself_in_a_wider_region(flown: Flown) -> None:
