@@ -28,7 +28,7 @@ WIDER = 2.0
 HERE_M, ELSEWHERE_M = 0.25, 0.5
 """Places this close to the true one are the same place, and beyond this another."""
 WORST = 2.0
-"""Cost of heights that correlate by -1; more than the product's other cost ever is [m^2]."""
+"""Cost of heights that correlate by -1; as ZMSSD [m^2], of heights that differ by 2 m RMS."""
 
 
 def add_wide_searches(

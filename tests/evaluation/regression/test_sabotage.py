@@ -30,9 +30,9 @@ from tests.localization.synthetic import aerial_points, box_heap, ground_points
 
 pytestmark = pytest.mark.slow
 
-# More than the suite flies: in a third of these heaps what lies at the ground map's edge is bare
-# floor, which resembles nothing, and the overlap rule has nothing to do.
 CONDITION = Condition("best", "synthetic", "nominal", "known")
+# More than the suite flies: in a third of these heaps no wide search goes wrong without the
+# overlap rule.
 FLIGHTS, LENGTH, SEQUENCES, SEARCHES = 20, 4, 3, 6
 DOWN = np.array([[0.0, -1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 TINY_CAMERA = PinholeCamera(2, 2, 1.0, 1.0, 0.5, 0.5)
