@@ -33,6 +33,7 @@ from airground.core.surface import AerialSurface
 from airground.core.trajectory import Trajectory
 from airground.dense.reconstruction import DenseReconstruction
 from airground.ground_map import FixedMap, GroundMap
+from airground.localization.height_map_pair import HeightMapPair
 from airground.localization.particle_filter import MonteCarloLocalizer
 from airground.refinement import refine
 from airground.slam.front_end import TrackedPose, Tracking
@@ -234,13 +235,19 @@ class Pipeline:
 
 def locate(localizer: MonteCarloLocalizer, sighting: Sighting) -> Iterator[Event]:
     """Feed one sighting to a localizer (Sec. VI)."""
-    yield from localizer.update(
+    yield from localizer.update(pair_of(sighting, localizer.config))
+
+
+def pair_of(sighting: Sighting, config: Config) -> HeightMapPair:
+    """What localizers under these parameters need of a sighting."""
+    return HeightMapPair(
         sighting.surface.stamp_ns,
         sighting.surface.cloud_mav.points,
         sighting.surface.T_mav_camera.translation,
         sighting.ground_cloud.points,
         sighting.T_ground_camera.translation[:2],
         sighting.heading,
+        config,
     )
 
 

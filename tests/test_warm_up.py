@@ -10,6 +10,7 @@ from airground.config import Config, Localization, paper
 from airground.core.belief import Belief
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
+from airground.localization.height_map_pair import HeightMapPair
 from airground.localization.particle_filter import MonteCarloLocalizer
 from airground.localization.warm_up import warm_up_localization
 from airground.refinement import refine
@@ -46,7 +47,8 @@ def localized(config: Config, clouds: Clouds) -> Belief:
     localizer = MonteCarloLocalizer(config, np.random.default_rng(0))
     for stamp in range(2):
         robot = np.array([0.3, 0.0])
-        list(localizer.update(stamp, aerial.points, CAMERA, ground.points, robot, 0.0))
+        pair = HeightMapPair(stamp, aerial.points, CAMERA, ground.points, robot, 0.0, config)
+        list(localizer.update(pair))
     assert localizer.belief is not None
     return localizer.belief
 

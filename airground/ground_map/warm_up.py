@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from airground.core.se3 import SE3, rotation_angle
 from airground.ground_map.surface_points import BLOCK, BlockedField, surface_points
 
 
 def warm_up_ground_map() -> None:
-    """Finds a plane in a field of one block."""
+    """Measures how far a pose has turned, and finds a plane in a field of one block."""
+    pose = SE3.identity()
+    rotation_angle(pose.rotation.T @ pose.rotation)
     shape = (1, BLOCK, BLOCK, BLOCK)
     heights = np.arange(BLOCK, dtype=np.float32) - BLOCK / 2 + 0.3
     tsdf = np.broadcast_to(heights[:, None, None], shape).astype(np.float32)

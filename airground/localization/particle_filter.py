@@ -9,15 +9,13 @@ from numpy.typing import NDArray
 
 from airground.config import Config
 from airground.core.agreement import agreement
-from airground.core.belief import Belief, HeightMap
+from airground.core.belief import Belief
 from airground.core.events import BeliefUpdated, CostMapComputed, Event, HeightMapsMade
 from airground.core.height_map import make_height_map
 from airground.core.se3 import SE3
-from airground.errors import InputError
 from airground.localization.acceptance import why_refused
-from airground.localization.cost_map import Overlays, overlay_at, overlay_turned, reach_of
-from airground.localization.height_map import aerial_height_map, ground_height_map
-from airground.localization.hypotheses import CostVolume, search_headings, search_positions
+from airground.localization.height_map_pair import HeightMapPair
+from airground.localization.hypotheses import CostVolume
 from airground.localization.particles import densest_mode, mean_pose, resample, span, weights
 
 
@@ -29,36 +27,23 @@ class MonteCarloLocalizer:
         rng: The one source of randomness.
 
     Attributes:
+        config: As given.
         belief: After the newest aerial surface, None before the first.
     """
 
     def __init__(self, config: Config, rng: np.random.Generator) -> None:
-        self._height_maps = config.height_maps
+        self.config = config
         self._local = config.localization
-        self._searched = config.localization.heading == "search"
         self._rng = rng
         self._particles: NDArray[np.float64] | None = None
         self._position_mav = np.zeros(3)
         self.belief: Belief | None = None
 
-    def update(
-        self,
-        stamp_ns: int,
-        points_mav: NDArray,
-        position_mav: NDArray,
-        ground_map: HeightMap | NDArray,
-        ground_robot_position: NDArray,
-        heading: float | None,
-    ) -> Iterator[Event]:
+    def update(self, pair: HeightMapPair) -> Iterator[Event]:
         """Take in one aerial surface.
 
         Args:
-            stamp_ns: Of the surface.
-            points_mav: (N, 3) its points in `mav` [m].
-            position_mav: (3,) the camera that it was seen from, in `mav` [m].
-            ground_map: (N, 3) the ground robot's points in `ground` [m], or their height map.
-            ground_robot_position: (2,) middle of the search region in `ground` [m].
-            heading: Turn of `mav` in `ground` [rad]; not used where it is searched.
+            pair: The surface and the ground map, under this filter's parameters.
 
         Yields:
             HeightMapsMade, CostMapComputed (where all of it is computed), BeliefUpdated.
@@ -66,85 +51,46 @@ class MonteCarloLocalizer:
         Raises:
             InputError: The heading is needed and unknown, or the resolutions differ.
         """
-        turn = self._heading(stamp_ns, heading)
-        position_mav = np.array(position_mav, np.float64)
-        aerial = aerial_height_map(points_mav, position_mav, turn, self._height_maps)
-        ground = self._ground_height_map(ground_map, ground_robot_position, aerial)
-        yield HeightMapsMade(stamp_ns, aerial, ground)
+        position_mav = np.array(pair.position_mav, np.float64)
+        yield HeightMapsMade(pair.stamp_ns, pair.aerial, pair.ground)
 
         # Costs of all hypotheses: for the first particles, and for those drawn anew.
         volume = None
         if self._particles is None or self._local.redrawn_fraction > 0:
-            volume = self._search(aerial, ground, ground_robot_position, turn)
-            yield CostMapComputed(stamp_ns, volume.cost_map(self._local.cost))
+            volume = pair.volume
+            yield CostMapComputed(pair.stamp_ns, volume.cost_map(self._local.cost))
 
         if self._particles is None:
             assert volume is not None
             sigma = self._sigma_of(volume.costs)
             particles = volume.draw(self._local.particles, sigma, self._rng)
         else:
-            moved = self._move(self._particles, position_mav - self._position_mav, turn)
-            costs = self._overlay(aerial, ground, moved).costs(self._local)
+            moved = self._move(self._particles, position_mav - self._position_mav, pair)
+            costs = pair.overlay(moved).costs(self._local)
             particles = moved[resample(weights(costs, self._sigma_of(costs)), self._rng)]
 
-        self.belief = self._summarize(
-            stamp_ns, particles, np.asarray(points_mav), position_mav, aerial, ground
-        )
+        self.belief = self._summarize(pair, particles)
         if volume is None or volume.feasible or self._particles is not None:
             # Else nothing overlapped yet, and the next surface is the first one again.
             self._particles = self._redraw(particles, volume)
         self._position_mav = position_mav
-        yield BeliefUpdated(stamp_ns, self.belief)
-
-    def _heading(self, stamp_ns: int, heading: float | None) -> float:
-        if self._searched:
-            return 0.0
-        if heading is None or not np.isfinite(heading):
-            raise InputError(
-                f"stamp {stamp_ns}: the heading of the MAV's map in the ground robot's is unknown; "
-                "give one, or set localization.heading to 'search'"
-            )
-        return float(heading)
-
-    def _ground_height_map(
-        self, ground_map: HeightMap | NDArray, robot: NDArray, aerial: HeightMap
-    ) -> HeightMap:
-        if isinstance(ground_map, HeightMap):
-            if ground_map.cells_per_m != self._height_maps.cells_per_m:
-                raise InputError(
-                    f"ground height map: {ground_map.cells_per_m:g} cells/m, expected "
-                    f"{self._height_maps.cells_per_m:g} (height_maps.cells_per_m)"
-                )
-            return ground_map
-        reach_m = float(np.linalg.norm(reach_of(aerial), axis=1).max() + 2) / aerial.cells_per_m
-        reach_m += self._local.search_radius_m
-        return ground_height_map(ground_map, robot, reach_m, self._height_maps)
-
-    def _search(
-        self, aerial: HeightMap, ground: HeightMap, robot: NDArray, turn: float
-    ) -> CostVolume:
-        if self._searched:
-            return search_headings(aerial, ground, robot, self._local)
-        return search_positions(aerial, ground, robot, turn, self._local)
-
-    def _overlay(self, aerial: HeightMap, ground: HeightMap, particles: NDArray) -> Overlays:
-        if self._searched:
-            return overlay_turned(aerial, ground, particles)
-        return overlay_at(aerial, ground, particles[:, :2])
+        yield BeliefUpdated(pair.stamp_ns, self.belief)
 
     def _sigma_of(self, costs: NDArray) -> float:
         """Sigma of Eq. 5 in units of the costs that it is used on."""
         scale = span(costs) if self._local.sigma_units == "minmax" else 1.0
         return self._local.sigma * scale
 
-    def _move(self, particles: NDArray, motion_mav: NDArray, turn: float) -> NDArray[np.float64]:
+    def _move(
+        self, particles: NDArray, motion_mav: NDArray, pair: HeightMapPair
+    ) -> NDArray[np.float64]:
         """Eq. 6: the motion that the MAV's SLAM saw, turned into `ground`, plus noise."""
         m = len(particles)
         moved = particles.copy()
-        if self._searched:
+        if pair.searched:
             moved[:, 2] += np.deg2rad(self._local.heading_noise_deg) * self._rng.normal(size=m)
         else:
-            moved[:, 2] = turn
+            moved[:, 2] = pair.turn
         c, s = np.cos(moved[:, 2]), np.sin(moved[:, 2])
         moved[:, 0] += c * motion_mav[0] - s * motion_mav[1]
         moved[:, 1] += s * motion_mav[0] + c * motion_mav[1]
@@ -163,26 +109,18 @@ class MonteCarloLocalizer:
         kept = self._rng.permutation(len(particles))[count:]
         return np.concatenate([particles[kept], drawn])
 
-    def _summarize(
-        self,
-        stamp_ns: int,
-        particles: NDArray,
-        points_mav: NDArray,
-        position_mav: NDArray,
-        aerial: HeightMap,
-        ground: HeightMap,
-    ) -> Belief:
+    def _summarize(self, pair: HeightMapPair, particles: NDArray) -> Belief:
         counted = particles
         if self._local.estimate == "mode":
             counted = particles[densest_mode(particles)]
         estimate = mean_pose(counted)
-        overlay = self._overlay(aerial, ground, estimate[None])
+        overlay = pair.overlay(estimate[None])
         offset = float(overlay.height_offsets()[0])
-        T_ground_mav = motion_at(estimate, position_mav, offset)
-        laid = make_height_map(T_ground_mav @ points_mav, ground.cells_per_m)
-        refusal = why_refused(overlay, agreement(laid, ground), particles, self._local)
+        T_ground_mav = motion_at(estimate, pair.position_mav, offset)
+        laid = make_height_map(T_ground_mav @ pair.points_mav, pair.ground.cells_per_m)
+        refusal = why_refused(overlay, agreement(laid, pair.ground), particles, self._local)
         return Belief(
-            stamp_ns=stamp_ns,
+            stamp_ns=pair.stamp_ns,
             particles=particles,
             estimate=estimate,
             covariance=np.cov(particles[:, :2].T),

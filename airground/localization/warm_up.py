@@ -6,6 +6,7 @@ import numpy as np
 
 from airground.config import Config
 from airground.core.cloud import PointCloud
+from airground.localization.height_map_pair import HeightMapPair
 from airground.localization.particle_filter import MonteCarloLocalizer
 
 SIDE_M = 1.0
@@ -28,5 +29,6 @@ def warm_up_localization(config: Config, rng: np.random.Generator) -> None:
     # Clouds cannot be written to, which kernels are compiled for.
     points = PointCloud(bump.astype(np.float32), np.zeros((len(bump), 3), np.uint8)).points
     for stamp_ns in range(2):
-        for _ in localizer.update(stamp_ns, points, np.zeros(3), points, np.zeros(2), 0.0):
+        pair = HeightMapPair(stamp_ns, points, np.zeros(3), points, np.zeros(2), 0.0, small)
+        for _ in localizer.update(pair):
             pass

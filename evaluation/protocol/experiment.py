@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import resource
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from evaluation.protocol.mapping_pass import GroundPass, Maps, map_ground, map_r
 from evaluation.protocol.setups import Setup
 from evaluation.protocol.trials import (
     Protocol,
-    localize_sequence,
+    localize_sequences,
     refine_sighting,
     sequence_starts,
     trial_sightings,
@@ -170,17 +171,21 @@ def _add_surfaces(out: RowWriter, maps: Maps, truth: Truth) -> None:
 def _add_sequences(out: RowWriter, maps: Maps, truth: Truth, setup: Setup, task: Task) -> None:
     length = task.protocol.sequence_length
     starts = sequence_starts(len(maps.sightings), task.protocol.sequences, length)
-    for sequence, start in enumerate(starts):
-        rng = np.random.default_rng([task.seed, task.flight, 1, sequence])
-        sightings = maps.sightings[start : start + length]
-        iteration = 0
-        for event, duration_ms, result in localize_sequence(sightings, truth, setup.config, rng):
+    filters = [
+        (start, np.random.default_rng([task.seed, task.flight, 1, sequence]))
+        for sequence, start in enumerate(starts)
+    ]
+    iterations = Counter[int]()
+    steps = localize_sequences(maps.sightings, length, truth, setup.config, filters)
+    for sequence, event, duration_ms, result in steps:
+        if duration_ms is not None:
             out.add("timing", STAGE_OF[type(event)], duration_ms, "ms")
-            if result is not None:
-                iteration += 1
-                distance = result.squared_mahalanobis
-                out.add_belief(result.belief, result.error, distance, sequence, iteration)
-        for missing in range(iteration + 1, length + 1):
+        if result is not None:
+            iterations[sequence] += 1
+            distance = result.squared_mahalanobis
+            out.add_belief(result.belief, result.error, distance, sequence, iterations[sequence])
+    for sequence in range(len(filters)):
+        for missing in range(iterations[sequence] + 1, length + 1):
             out.add_no_belief("the flight gave no further aerial map", sequence, missing)
 
 

@@ -10,10 +10,11 @@ import numpy as np
 
 from airground.config import Config
 from airground.core.belief import Alignment, Belief
-from airground.core.events import BeliefUpdated, Event
+from airground.core.events import BeliefUpdated, CostMapComputed, Event, HeightMapsMade
 from airground.core.se3 import SE3
+from airground.localization.height_map_pair import HeightMapPair
 from airground.localization.particle_filter import MonteCarloLocalizer
-from airground.pipeline import Sighting, locate
+from airground.pipeline import Sighting, pair_of
 from airground.refinement import refine
 from evaluation.runs.timing import timed
 from evaluation.truth.relation import PoseError, pose_error, squared_mahalanobis, true_T_ground_mav
@@ -104,13 +105,55 @@ def localize_sequence(
     """
     localizer = MonteCarloLocalizer(config, rng)
     for sighting in sightings:
-        for event, duration_ms in timed(locate(localizer, sighting)):
-            iteration = None
-            if isinstance(event, BeliefUpdated):
-                error = pose_error(event.belief.T_ground_mav, sighting, truth)
-                distance = squared_mahalanobis(event.belief, sighting, truth)
-                iteration = Iteration(event.belief, error, distance)
-            yield event, duration_ms, iteration
+        yield from _taken_in(localizer, pair_of(sighting, config), sighting, truth)
+
+
+def localize_sequences(
+    sightings: Sequence[Sighting],
+    length: int,
+    truth: Truth,
+    config: Config,
+    filters: Sequence[tuple[int, np.random.Generator]],
+) -> Iterator[tuple[int, Event, float | None, Iteration | None]]:
+    """Run sequences that overlap side by side, each as `localize_sequence` would.
+
+    What an aerial map says by itself is computed once for all of them: with headings searched,
+    that is nearly everything.
+
+    Args:
+        sightings: Of a flight.
+        length: Sightings in a sequence.
+        truth: Judges.
+        config: Of all filters.
+        filters: Where each sequence begins, and its source of randomness.
+
+    Yields:
+        The number of the sequence, and its next event; its time [ms], None where another
+        sequence had it computed; the iteration that it completes.
+    """
+    localizers = [MonteCarloLocalizer(config, rng) for _, rng in filters]
+    for index, sighting in enumerate(sightings):
+        pair, computed = pair_of(sighting, config), set[type[Event]]()
+        for sequence, (start, _) in enumerate(filters):
+            if start <= index < start + length:
+                steps = _taken_in(localizers[sequence], pair, sighting, truth)
+                for event, duration_ms, iteration in steps:
+                    again = type(event) in computed
+                    yield sequence, event, None if again else duration_ms, iteration
+                    if isinstance(event, (HeightMapsMade, CostMapComputed)):
+                        computed.add(type(event))
+
+
+def _taken_in(
+    localizer: MonteCarloLocalizer, pair: HeightMapPair, sighting: Sighting, truth: Truth
+) -> Iterator[tuple[Event, float, Iteration | None]]:
+    for event, duration_ms in timed(localizer.update(pair)):
+        iteration = None
+        if isinstance(event, BeliefUpdated):
+            error = pose_error(event.belief.T_ground_mav, sighting, truth)
+            distance = squared_mahalanobis(event.belief, sighting, truth)
+            iteration = Iteration(event.belief, error, distance)
+        yield event, duration_ms, iteration
 
 
 def noisy_start(T_ground_mav: SE3, T_mav_camera: SE3, rng: np.random.Generator) -> SE3:

@@ -6,6 +6,7 @@ no success rate.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -22,7 +23,7 @@ from evaluation.protocol.mapping_pass import GroundPass, Maps
 from evaluation.protocol.trials import (
     Iteration,
     Protocol,
-    localize_sequence,
+    localize_sequences,
     sequence_starts,
     trial_sightings,
 )
@@ -96,13 +97,16 @@ def _add_case(
     seed: tuple[int, int],
     protocol: Protocol,
 ) -> None:
-    starts = sequence_starts(len(sightings), protocol.sequences, protocol.sequence_length)
-    for sequence, start in enumerate(starts):
-        rng = np.random.default_rng([*seed, 6, case.number, sequence])
-        part = sightings[start : start + protocol.sequence_length]
-        steps = [step for _, _, step in localize_sequence(part, truth, config, rng) if step]
-        for iteration, step in enumerate(steps, 1):
-            _add_belief(out, case, step, sequence, iteration)
+    length, iterations = protocol.sequence_length, Counter[int]()
+    starts = sequence_starts(len(sightings), protocol.sequences, length)
+    filters = [
+        (start, np.random.default_rng([*seed, 6, case.number, sequence]))
+        for sequence, start in enumerate(starts)
+    ]
+    for sequence, _, _, step in localize_sequences(sightings, length, truth, config, filters):
+        if step is not None:
+            iterations[sequence] += 1
+            _add_belief(out, case, step, sequence, iterations[sequence])
     for trial, index in enumerate(trial_sightings(len(sightings), protocol.trials)):
         rng = np.random.default_rng([*seed, 7, case.number, trial])
         alignment = refine_best_guess(sightings[index], config, rng)

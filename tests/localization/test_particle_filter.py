@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from airground.config import Config, paper
-from airground.core.belief import HeightMap
 from airground.core.events import BeliefUpdated, CostMapComputed, HeightMapsMade
 from airground.core.se3 import SE3
-from airground.errors import InputError
+from airground.localization.height_map_pair import HeightMapPair
 from airground.localization.particle_filter import MonteCarloLocalizer
 from tests.localization.synthetic import aerial_points, box_heap, flat_world, ground_points
 
@@ -32,9 +31,8 @@ class Flight:
         events = []
         for stamp, (points, position) in enumerate(self.maps):
             robot = np.array([0.3, 0.0])
-            events.append(
-                list(localizer.update(stamp, points, position, self.ground, robot, heading))
-            )
+            pair = HeightMapPair(stamp, points, position, self.ground, robot, heading, config)
+            events.append(list(localizer.update(pair)))
         return events
 
 
@@ -132,7 +130,8 @@ def test_a_map_without_overlap_neither_kills_the_belief_nor_claims(flight):
     steps = [flight.ground, flight.ground + np.float32(50), flight.ground]
     found = []
     for stamp, ground in enumerate(steps):
-        *_, last = localizer.update(stamp, points, position, ground, robot, HEADING)
+        pair = HeightMapPair(stamp, points, position, ground, robot, HEADING, Config())
+        *_, last = localizer.update(pair)
         found.append(last.belief)
     assert not found[1].converged
     assert "lies on the ground map" in found[1].refusal
@@ -144,16 +143,7 @@ def test_a_map_without_overlap_neither_kills_the_belief_nor_claims(flight):
 def test_an_empty_surface_is_refused_not_an_error(flight, points, heading):
     config = changed(Config(), heading=heading, headings=30)
     localizer = MonteCarloLocalizer(config, np.random.default_rng(0))
-    *_, last = localizer.update(0, points, np.zeros(3), flight.ground, np.zeros(2), HEADING)
+    pair = HeightMapPair(0, points, np.zeros(3), flight.ground, np.zeros(2), HEADING, config)
+    *_, last = localizer.update(pair)
     assert not last.belief.converged
     assert last.belief.refusal
-
-
-def test_what_cannot_be_used_is_named(flight):
-    points, position = flight.maps[0]
-    localizer = MonteCarloLocalizer(Config(), np.random.default_rng(0))
-    with pytest.raises(InputError, match="stamp 7: the heading"):
-        list(localizer.update(7, points, position, flight.ground, np.zeros(2), None))
-    coarse = HeightMap(np.zeros((3, 3), np.float32), np.zeros(2), 10.0)
-    with pytest.raises(InputError, match="10 cells/m, expected 25"):
-        list(localizer.update(7, points, position, coarse, np.zeros(2), HEADING))

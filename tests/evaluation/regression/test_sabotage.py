@@ -17,7 +17,7 @@ from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
 from airground.core.surface import AerialSurface
-from airground.localization import cost_map, particle_filter
+from airground.localization import cost_map, height_map_pair
 from airground.localization.particle_filter import MonteCarloLocalizer
 from airground.pipeline import Sighting
 from evaluation.protocol.trials import localize_sequence
@@ -132,13 +132,13 @@ def test_the_unchanged_program_is_not_flagged(flown: list[Flown], clean: Measure
 
 
 def shift_by_two_cells(patch: pytest.MonkeyPatch) -> None:
-    original = particle_filter.ground_height_map
+    original = height_map_pair.ground_height_map
 
     def shifted(*args: object) -> object:
         made = original(*args)  # type: ignore[arg-type]
         return replace(made, origin=made.origin + 2 / made.cells_per_m)
 
-    patch.setattr(particle_filter, "ground_height_map", shifted)
+    patch.setattr(height_map_pair, "ground_height_map", shifted)
 
 
 def drop_the_overlap_rule(patch: pytest.MonkeyPatch) -> None:

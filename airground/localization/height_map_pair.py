@@ -1,0 +1,104 @@
+"""The height maps of an aerial surface and of the ground map, and what they say together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.config import Config
+from airground.core.belief import HeightMap
+from airground.errors import InputError
+from airground.localization.cost_map import Overlays, overlay_at, overlay_turned, reach_of
+from airground.localization.height_map import aerial_height_map, ground_height_map
+from airground.localization.hypotheses import CostVolume, search_headings, search_positions
+
+
+@dataclass(frozen=True, eq=False)
+class HeightMapPair:
+    """An aerial surface and the ground map of its time, and all that follows from these two.
+
+    Several filters may take in the same one. What is costly is computed when it is first asked
+    for, and kept.
+
+    Attributes:
+        stamp_ns: Of the surface.
+        points_mav: (N, 3) its points in `mav` [m].
+        position_mav: (3,) the camera that it was seen from, in `mav` [m].
+        ground_map: (N, 3) the ground robot's points in `ground` [m], or their height map.
+        ground_robot_position: (2,) middle of the search region in `ground` [m].
+        heading: Turn of `mav` in `ground` [rad]; not used where it is searched.
+        config: The pipeline's parameters; height maps and localization are used.
+    """
+
+    stamp_ns: int
+    points_mav: NDArray
+    position_mav: NDArray
+    ground_map: HeightMap | NDArray
+    ground_robot_position: NDArray
+    heading: float | None
+    config: Config
+
+    @property
+    def searched(self) -> bool:
+        """Whether the heading is one of the unknowns."""
+        return self.config.localization.heading == "search"
+
+    @cached_property
+    def turn(self) -> float:
+        """Turn of `mav` that the aerial height map is made for [rad]; 0 where it is searched.
+
+        Raises:
+            InputError: It is needed and unknown.
+        """
+        if self.searched:
+            return 0.0
+        if self.heading is None or not np.isfinite(self.heading):
+            raise InputError(
+                f"stamp {self.stamp_ns}: the heading of the MAV's map in the ground robot's is "
+                "unknown; give one, or set localization.heading to 'search'"
+            )
+        return float(self.heading)
+
+    @cached_property
+    def aerial(self) -> HeightMap:
+        """Heights around the MAV's camera."""
+        return aerial_height_map(
+            self.points_mav, self.position_mav, self.turn, self.config.height_maps
+        )
+
+    @cached_property
+    def ground(self) -> HeightMap:
+        """Heights of the ground map, as far as the aerial one may reach.
+
+        Raises:
+            InputError: One was given, of another resolution.
+        """
+        wanted = self.config.height_maps
+        if isinstance(self.ground_map, HeightMap):
+            if self.ground_map.cells_per_m != wanted.cells_per_m:
+                raise InputError(
+                    f"ground height map: {self.ground_map.cells_per_m:g} cells/m, expected "
+                    f"{wanted.cells_per_m:g} (height_maps.cells_per_m)"
+                )
+            return self.ground_map
+        reach_cells = float(np.linalg.norm(reach_of(self.aerial), axis=1).max() + 2)
+        reach_m = reach_cells / self.aerial.cells_per_m
+        reach_m += self.config.localization.search_radius_m
+        return ground_height_map(self.ground_map, self.ground_robot_position, reach_m, wanted)
+
+    @cached_property
+    def volume(self) -> CostVolume:
+        """Costs of all hypotheses (Eq. 2)."""
+        robot, local = self.ground_robot_position, self.config.localization
+        if self.searched:
+            return search_headings(self.aerial, self.ground, robot, local)
+        return search_positions(self.aerial, self.ground, robot, self.turn, local)
+
+    def overlay(self, particles: NDArray) -> Overlays:
+        """The aerial heights laid on the ground's at each of (M, 3) x, y [m] and heading [rad]."""
+        if self.searched:
+            return overlay_turned(self.aerial, self.ground, particles)
+        return overlay_at(self.aerial, self.ground, particles[:, :2])

@@ -1,0 +1,57 @@
+"""An aerial surface on a ground map: shared by filters, and plain about what it cannot use."""
+
+import numpy as np
+import pytest
+
+from airground.config import Config
+from airground.core.belief import HeightMap
+from airground.errors import InputError
+from airground.localization import height_map_pair
+from airground.localization.height_map_pair import HeightMapPair
+from airground.localization.hypotheses import search_positions
+from airground.localization.particle_filter import MonteCarloLocalizer
+from tests.localization.synthetic import aerial_points, box_heap, ground_points
+
+POSITION = np.array([-0.2, 0.3, 2.2])
+
+
+@pytest.fixture(scope="module")
+def clouds():
+    rng, heap = np.random.default_rng(3), box_heap(1)
+    aerial = aerial_points(heap, *POSITION[:2], rng).astype(np.float32)
+    return aerial, ground_points(heap, rng, frames=20)
+
+
+def paired(clouds, heading=0.0, ground=None):
+    aerial, seen = clouds
+    ground = seen if ground is None else ground
+    return HeightMapPair(7, aerial, POSITION, ground, np.zeros(2), heading, Config())
+
+
+def test_filters_that_share_one_search_once_and_find_the_same(clouds, monkeypatch):
+    searches = []
+
+    def counted(*args):
+        searches.append(args)
+        return search_positions(*args)
+
+    monkeypatch.setattr(height_map_pair, "search_positions", counted)
+    shared, found = paired(clouds), []
+    for seed in range(3):
+        for pair in (shared, paired(clouds)):
+            localizer = MonteCarloLocalizer(Config(), np.random.default_rng(seed))
+            *_, last = localizer.update(pair)
+            found.append(last.belief.particles)
+    assert len(searches) == 1 + 3
+    for together, alone in zip(found[::2], found[1::2], strict=True):
+        np.testing.assert_array_equal(together, alone)
+
+
+def test_what_cannot_be_used_is_named(clouds):
+    localizer = MonteCarloLocalizer(Config(), np.random.default_rng(0))
+    for heading in (None, np.nan):
+        with pytest.raises(InputError, match="stamp 7: the heading"):
+            list(localizer.update(paired(clouds, heading)))
+    coarse = HeightMap(np.zeros((3, 3), np.float32), np.zeros(2), 10.0)
+    with pytest.raises(InputError, match="10 cells/m, expected 25"):
+        list(localizer.update(paired(clouds, ground=coarse)))
