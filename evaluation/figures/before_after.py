@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from evaluation.figures.boxes import draw_box, log_axis, positions
+from evaluation.figures.boxes import TITLE_PAD_PT, draw_box, log_axis, positions
 from evaluation.figures.style import COLUMN_IN, PAPER, SERIES, SMALL_PT, styled
 from evaluation.statistics.intervals import quantile, with_failures
 
@@ -63,7 +63,7 @@ def before_after_figure(
     axes.text(1.52, paper, f"paper\n{paper:g} {unit}", color=PAPER, ha="left", va="center")
     axes.set_xlim(-0.5, 1.5)
     axes.set_xticks([0, 1], ["before ICP", "after ICP"])
-    axes.set_title(title, pad=16)
+    axes.set_title(title, pad=TITLE_PAD_PT)
     figure.legend(loc="outside upper left")
     return figure
 

@@ -11,6 +11,10 @@ from evaluation.figures.style import SMALL_PT
 from evaluation.statistics.intervals import quantile, with_failures
 
 MOST_TICKS = 14
+TITLE_PAD_PT = 23
+"""Above boxes, whose failures are counted between them and the title."""
+NARROW = 0.4
+"""Boxes narrower than this have no room for a count of two digits beside their neighbours'."""
 
 
 def draw_box(axes: Axes, x: float, values: ArrayLike, width: float, colour: str) -> None:
@@ -69,6 +73,7 @@ def draw_box(axes: Axes, x: float, values: ArrayLike, width: float, colour: str)
             va="bottom",
             fontsize=SMALL_PT,
             color=colour,
+            rotation=90 if width < NARROW else 0,
         )
 
 

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from evaluation.figures.boxes import draw_box, iteration_axis, log_axis, positions
+from evaluation.figures.boxes import TITLE_PAD_PT, draw_box, iteration_axis, log_axis, positions
 from evaluation.figures.style import PAPER, SERIES, WIDE_IN, styled
 from evaluation.report import published
 from evaluation.statistics.intervals import rate_within
@@ -43,7 +43,9 @@ def localization_error_figure(
         for iteration, values in enumerate(error.T, 1):
             draw_box(boxes, iteration + offset, values, width, colours[group])
         boxes.plot([], [], color=colours[group], linewidth=6, alpha=0.6, label=label)
-    boxes.set_title("error of the MAV's position relative to the ground robot [m]", pad=16)
+    boxes.set_title(
+        "error of the MAV's position relative to the ground robot [m]", pad=TITLE_PAD_PT
+    )
     iteration_axis(boxes, list(errors.values()))
     figure.legend(loc="outside upper left")
 

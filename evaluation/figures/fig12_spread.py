@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from evaluation.figures.boxes import draw_box, iteration_axis, log_axis, positions
+from evaluation.figures.boxes import TITLE_PAD_PT, draw_box, iteration_axis, log_axis, positions
 from evaluation.figures.style import SERIES, WIDE_IN, styled
 
 
@@ -32,6 +32,6 @@ def spread_figure(
             draw_box(axes, iteration + offset, values, width, colours[group])
         axes.plot([], [], color=colours[group], linewidth=6, alpha=0.6, label=label)
     iteration_axis(axes, list(spreads.values()))
-    axes.set_title("standard deviation of the particles [m]", pad=16)
+    axes.set_title("standard deviation of the particles [m]", pad=TITLE_PAD_PT)
     figure.legend(loc="outside upper left")
     return figure

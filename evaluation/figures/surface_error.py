@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from evaluation.figures.boxes import draw_box, log_axis
+from evaluation.figures.boxes import TITLE_PAD_PT, draw_box, log_axis
 from evaluation.figures.style import SERIES, WIDE_IN, styled
 
 Values = dict[str, NDArray[np.float64]]
@@ -45,4 +45,4 @@ def _boxes(axes: Axes, groups: Values, title: str, colours: Sequence[str]) -> No
         draw_box(axes, x, values, 0.6, colour)
     axes.set_xlim(-0.6, len(groups) - 0.4)
     axes.set_xticks([])
-    axes.set_title(title, pad=16)
+    axes.set_title(title, pad=TITLE_PAD_PT)
