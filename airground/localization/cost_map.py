@@ -23,7 +23,7 @@ from airground.localization.cost_kernels import (
     sums_at_positions,
     zmssd,
 )
-from airground.localization.turned_kernels import MARGIN, filled_cells, paired, sums_at_poses
+from airground.localization.turned_kernels import MARGIN, filled_cells, in_fours, sums_at_poses
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,9 +229,9 @@ def overlay_turned(aerial: HeightMap, ground: HeightMap, poses: NDArray) -> Over
     reach = np.array([[-farthest, -farthest], [farthest, farthest]])
     heights, first = _within_reach(ground, poses[:, :2], reach)
     cells, mean_aerial = filled_cells(aerial.heights, *lattice_index(aerial))
-    pairs, mean_ground = paired(heights)
+    fours, mean_ground = in_fours(heights)
     poses[:, :2] += MARGIN - first
-    sums = sums_at_poses(cells, pairs, poses)
+    sums = sums_at_poses(cells, fours, poses)
     return Overlays(sums, mean_aerial, mean_ground, cells.shape[1])
 
 

@@ -1,7 +1,7 @@
 """Sums over the overlap of a turned aerial height map with the ground's (see `cost_kernels`).
 
-Turned, each aerial cell falls between four others of the ground map. Looking these up takes
-most of the time, so neighbours along a row lie in memory as pairs, and one load brings two.
+Turned, each aerial cell falls between four others of the ground map. Looking these up would
+take most of the time, so every four lie in memory side by side: two loads, from one place.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from airground.localization.cost_kernels import KEEPS_NAN, mean_height
 BLOCK = 512
 """Cells that are placed, looked up and added up at a time, so that they stay in the cache."""
 MARGIN = 2
-"""Empty cells around paired heights: a place outside is moved there, where nothing counts."""
+"""Empty cells around the heights: a place outside is moved there, where nothing counts."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -41,42 +41,47 @@ def filled_cells(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def paired(heights: NDArray[np.float32]) -> tuple[NDArray[np.float32], float]:
-    """Ground heights about their mean (nx + 4, ny + 4, 2), each with the next of its row; the mean.
+def in_fours(heights: NDArray[np.float32]) -> tuple[NDArray[np.float32], float]:
+    """Ground heights about their mean (nx + 4, ny + 4, 4), with all that lie between them; the mean.
 
     Args:
         heights: (nx, ny) [m], NaN in holes.
 
     Returns:
-        NaN in holes and in `MARGIN` cells around; and the mean [m].
+        Each cell, the next of its row, and the two behind these in the next row; NaN in holes and
+        in `MARGIN` cells around. And the mean [m].
     """
     mean, _ = mean_height(heights)
     nx, ny = heights.shape
-    pairs = np.full((nx + 2 * MARGIN, ny + 2 * MARGIN, 2), np.float32(np.nan), np.float32)
+    rows, columns = nx + 2 * MARGIN, ny + 2 * MARGIN
+    about = np.full((rows + 1, columns + 1), np.float32(np.nan), np.float32)
     for i in range(nx):
-        row, line = heights[i], pairs[i + MARGIN].ravel()
         for j in range(ny):
-            # As the second of one pair and the first of the next, which lie side by side.
-            at = 2 * (j + MARGIN)
-            line[at - 1] = line[at] = row[j] - np.float32(mean)
-    return pairs, mean
+            about[i + MARGIN, j + MARGIN] = heights[i, j] - np.float32(mean)
+    fours = np.empty((rows, columns, 4), np.float32)
+    for i in range(rows):
+        here, behind, four = about[i], about[i + 1], fours[i]
+        for j in range(columns):
+            four[j, 0], four[j, 1] = here[j], here[j + 1]
+            four[j, 2], four[j, 3] = behind[j], behind[j + 1]
+    return fours, mean
 
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=KEEPS_NAN)
 def sums_at_poses(
-    cells: NDArray[np.float32], pairs: NDArray[np.float32], poses: NDArray[np.float64]
+    cells: NDArray[np.float32], fours: NDArray[np.float32], poses: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """The six sums (M, 6) for M poses of a turned aerial map.
 
     Args:
         cells: (3, K) as `filled_cells` returns them.
-        pairs: (rows, columns, 2) as `paired` returns them.
-        poses: (M, 3) index of the camera in `pairs` [cells], and heading [rad].
+        fours: (rows, columns, 4) as `in_fours` returns them.
+        poses: (M, 3) index of the camera in `fours` [cells], and heading [rad].
     """
     sums = np.zeros((len(poses), 6))
-    rows, columns, _ = pairs.shape
-    # A pair of float32 travels as one number of 8 bytes.
-    packed = pairs.reshape(2 * rows * columns).view(np.float64)
+    rows, columns, _ = fours.shape
+    # Two float32 travel as one number of 8 bytes.
+    packed = fours.reshape(4 * rows * columns).view(np.float64)
     last = np.float32(rows - 2), np.float32(columns - 2)
     for p in prange(len(poses)):
         place = np.float32(poses[p, 0]), np.float32(poses[p, 1])
@@ -89,7 +94,7 @@ def sums_at_poses(
             # One-dimensional slices: only these are known to be contiguous.
             x, y = cells[0, begin : begin + n], cells[1, begin : begin + n]
             _place_cells(x, y, place, turn, last, columns, index, fractions[0], fractions[1])
-            _look_up(packed, columns, index, n, corners)
+            _look_up(packed, index, n, corners)
             _add_cells(
                 cells[2, begin : begin + n],
                 fractions[0],
@@ -125,11 +130,11 @@ def _place_cells(
 
 
 @njit(cache=True, error_model="numpy")
-def _look_up(packed: NDArray, columns: int, index: NDArray, n: int, corners: NDArray) -> None:
-    """The pairs of heights before and behind each of n places."""
-    below = packed[columns:]
+def _look_up(packed: NDArray, index: NDArray, n: int, corners: NDArray) -> None:
+    """The four heights around each of n places."""
     for i in range(n):
-        corners[2 * i], corners[2 * i + 1] = packed[index[i]], below[index[i]]
+        four = 2 * index[i]
+        corners[2 * i], corners[2 * i + 1] = packed[four], packed[four + 1]
 
 
 @njit(cache=True, error_model="numpy", fastmath=KEEPS_NAN)

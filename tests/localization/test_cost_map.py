@@ -17,7 +17,7 @@ from airground.localization.cost_map import (
     overlay_turned,
     reach_of,
 )
-from airground.localization.turned_kernels import MARGIN, filled_cells, paired
+from airground.localization.turned_kernels import MARGIN, filled_cells, in_fours
 from tests.localization import naive
 
 CELLS_PER_M = 10.0
@@ -204,13 +204,14 @@ def test_filled_cells_are_those_of_arrays() -> None:
 
 
 @pytest.mark.kernel
-def test_pairs_hold_each_height_with_the_next_of_its_row() -> None:
+def test_fours_hold_each_height_with_those_beside_and_behind() -> None:
     heights = random_map(np.random.default_rng(2), (6, 9), (0, 0)).heights
-    pairs, mean = paired(heights)
+    fours, mean = in_fours(heights)
     centred = np.pad(heights - np.float32(mean), MARGIN, constant_values=np.nan)
-    following = np.pad(centred[:, 1:], ((0, 0), (0, 1)), constant_values=np.nan)
+    wider = np.pad(centred, (0, 1), constant_values=np.nan)
     assert np.isnan(heights).any()
-    np.testing.assert_array_equal(pairs, np.stack([centred, following], axis=2))
+    around = [centred, wider[:-1, 1:], wider[1:, :-1], wider[1:, 1:]]
+    np.testing.assert_array_equal(fours, np.stack(around, axis=2))
 
 
 def test_transforms_of_filled_rows_alone_are_the_whole_ones() -> None:
