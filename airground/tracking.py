@@ -20,7 +20,6 @@ from airground.core.messages import (
     RobotCalibration,
     Stamped,
 )
-from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.localization.heading import HeadingEstimator
 from airground.slam.front_end import FrontEnd, TrackedPose
@@ -75,7 +74,7 @@ class RobotTracker:
         self, robot: Source, calibration: RobotCalibration, front_end: FrontEnd[Any]
     ) -> None:
         self._robot, self._front_end = robot, front_end
-        self._R_camera_imu = calibration.T_imu_camera.rotation.T
+        self._T_camera_imu = calibration.T_imu_camera.inverse()
         self._magnetic: list[MagneticSamples] = []
         self._north = HeadingEstimator()
 
@@ -98,18 +97,15 @@ class RobotTracker:
     def _track(self, image: MavImage | GroundImage) -> TrackedFrame:
         pose = self._front_end.track(image)
         trajectory = None
+        # What was measured before the robot knew its attitude says nothing.
+        magnetic, self._magnetic = self._magnetic, []
         if pose.T_map_camera is not None:
-            self._take_bearing(pose.T_map_camera)
+            for samples in magnetic:
+                self._north.add(samples.field, pose.T_map_camera @ self._T_camera_imu)
             # Surfaces that the MAV has handed over stay as they were: nobody needs its path.
             if pose.corrected and self._robot == Source.GROUND:
                 trajectory = self._front_end.trajectory()
         return TrackedFrame(image, pose, self._north.heading(), trajectory)
-
-    def _take_bearing(self, T_map_camera: SE3) -> None:
-        """Turn the magnetic field measured since the last image into the robot's map."""
-        for samples in self._magnetic:
-            self._north.add(samples.field, T_map_camera.rotation @ self._R_camera_imu)
-        self._magnetic.clear()
 
 
 class Trackers:

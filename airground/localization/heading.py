@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
+
+from airground.core.se3 import SE3, rotation_angle
 
 BINS = 720
 KERNEL_DEG = 5.0
 MIN_SAMPLES = 50
 MAX_SPREAD = np.deg2rad(30.0)
+PLACE_M, PLACE_RAD = 0.1, np.deg2rad(10.0)
+"""A robot that moved, or turned, less than this is where it was."""
 
 
 class HeadingEstimator:
     """A robust running average of the magnetic field's direction in a gravity-aligned map.
+
+    Iron nearby bends the field, by the same amount as long as the robot stays: the n-th sample
+    at a place counts 1/n, or minutes on the floor would outvote all of a flight.
 
     Directions go into a histogram over the circle, so that memory does not grow; the
     average is taken around its densest place. A disturbance that lasts a minority of the
@@ -20,27 +29,35 @@ class HeadingEstimator:
     """
 
     def __init__(self) -> None:
+        self._samples = 0
+        self._place: SE3 | None = None
+        self._samples_here = 0
         self._counts = np.zeros(BINS)
         self._sums = np.zeros(BINS, np.complex128)
 
-    def add(self, field_imu: NDArray, R_map_imu: NDArray) -> None:
+    def add(self, field_imu: NDArray, T_map_imu: SE3) -> None:
         """Take in magnetic field samples.
 
         Args:
             field_imu: (N, 3) [T] in the IMU's frame; samples with a NaN are left out.
-            R_map_imu: (3, 3) the IMU's orientation in the map when they were taken.
+            T_map_imu: Where the IMU was in the map when they were taken.
         """
-        field = np.asarray(field_imu, np.float64).reshape(-1, 3) @ np.asarray(R_map_imu).T
+        if self._place is None or _elsewhere(self._place, T_map_imu):
+            self._place, self._samples_here = T_map_imu, 0
+        field = np.asarray(field_imu, np.float64).reshape(-1, 3) @ T_map_imu.rotation.T
         horizontal = field[:, 0] + 1j * field[:, 1]
         horizontal = horizontal[np.isfinite(horizontal) & (np.abs(horizontal) > 0)]
         directions = horizontal / np.abs(horizontal)
+        weights = 1.0 / np.arange(self._samples_here + 1, self._samples_here + len(directions) + 1)
+        self._samples_here += len(directions)
+        self._samples += len(directions)
         bins = np.floor((np.angle(directions) / (2 * np.pi) + 0.5) * BINS).astype(int) % BINS
-        np.add.at(self._counts, bins, 1)
-        np.add.at(self._sums, bins, directions)
+        np.add.at(self._counts, bins, weights)
+        np.add.at(self._sums, bins, weights * directions)
 
     def heading(self) -> float | None:
         """Direction of magnetic north in the map [rad], None while too little is known."""
-        if self._counts.sum() < MIN_SAMPLES:
+        if self._samples < MIN_SAMPLES:
             return None
         weights = self._weights()
         mean = (weights * self._sums).sum()
@@ -65,3 +82,8 @@ class HeadingEstimator:
         density = np.fft.irfft(np.fft.rfft(self._counts) * np.fft.rfft(kernel), BINS)
         bell = np.exp(-0.5 * (distance / (3 * KERNEL_DEG)) ** 2)
         return np.roll(bell, int(np.argmax(density)))
+
+
+def _elsewhere(place: SE3, pose: SE3) -> bool:
+    moved = math.dist(place.translation, pose.translation)
+    return moved > PLACE_M or rotation_angle(place.rotation.T @ pose.rotation) > PLACE_RAD

@@ -42,7 +42,7 @@ def filled_cells(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def in_fours(heights: NDArray[np.float32]) -> tuple[NDArray[np.float32], float]:
-    """Ground heights about their mean (nx + 4, ny + 4, 4), with all that lie between them; the mean.
+    """Ground heights about their mean (nx + 4, ny + 4, 4), each with those beside and behind.
 
     Args:
         heights: (nx, ny) [m], NaN in holes.
