@@ -1,4 +1,4 @@
-"""Height maps of an aerial surface and of the ground map, and what they say together (Sec. VI-A)."""
+"""Height maps of an aerial surface and of the ground, and what they say together (Sec. VI-A)."""
 
 from __future__ import annotations
 
