@@ -21,6 +21,7 @@ from airground.core.cloud import PointCloud
 from airground.core.messages import GroundImage
 from airground.core.se3 import SE3, rotation_angle
 from airground.core.trajectory import Trajectory
+from airground.ground_map.integration import integrate
 from airground.ground_map.keyframe import GroundKeyframe
 from airground.ground_map.surface_points import (
     ATTRIBUTES,
@@ -42,6 +43,7 @@ class GroundMap:
 
     def __init__(self, camera: PinholeCamera, config: GroundMapping) -> None:
         self._config = config
+        self._camera = camera
         self._intrinsics = o3d.core.Tensor.from_numpy(camera.matrix())
         self._keyframes: list[GroundKeyframe] = []
         self._grid = self._empty_grid()
@@ -128,16 +130,25 @@ class GroundMap:
         measured = keyframe.depth()
         if not measured.any():
             return  # Open3D refuses an image that touches nothing
-        depth = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(measured))
-        colours = keyframe.colour().astype(np.float32)
-        colour = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(colours))
-        T_camera_ground = o3d.core.Tensor.from_numpy(keyframe.T_ground_camera.inverse().matrix())
-        config = self._config
-        reach = (1.0, config.max_depth_m, config.truncation_m / config.voxel_m)
+        config, pose = self._config, keyframe.T_ground_camera
         blocks = self._grid.compute_unique_block_coordinates(
-            depth, self._intrinsics, T_camera_ground, *reach
+            o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(measured)),
+            self._intrinsics,
+            o3d.core.Tensor.from_numpy(pose.inverse().matrix()),
+            depth_scale=1.0,
+            depth_max=config.max_depth_m,
+            trunc_voxel_multiplier=config.truncation_m / config.voxel_m,
         )
-        self._grid.integrate(blocks, depth, colour, self._intrinsics, T_camera_ground, *reach)
+        integrate(
+            self._grid,
+            blocks,
+            measured,
+            keyframe.colour(),
+            self._camera,
+            pose,
+            config.voxel_m,
+            config.truncation_m,
+        )
 
 
 def _corrected(keyframe: GroundKeyframe, trajectory: Trajectory) -> GroundKeyframe:

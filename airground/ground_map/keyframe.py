@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from isal import isal_zlib
+from numba import njit
 from numpy.typing import NDArray
 
 from airground.core.messages import GroundImage
@@ -15,6 +16,8 @@ from airground.core.se3 import SE3
 FINEST_STEP_M = 1e-4
 """Depth is kept in steps of this [m]: far below a sensor's noise, up to 6.5 m in 16 bits."""
 LEVELS = np.iinfo(np.uint16).max
+JUMP = np.float32(0.05)
+"""Neighbours whose depths differ by more than this share are of different surfaces."""
 JPEG_QUALITY = 95
 """Some 90 kB an image of 640 x 480, where lossless compression takes 550."""
 
@@ -42,11 +45,8 @@ class GroundKeyframe:
     @classmethod
     def pack(cls, image: GroundImage, T_ground_camera: SE3, max_depth_m: float) -> GroundKeyframe:
         """Keep an image; depth beyond `max_depth_m` and beside silhouettes is left out."""
-        depth = image.depth
-        with np.errstate(invalid="ignore"):
-            usable = ~near_silhouette(depth) & (depth > 0) & (depth <= max_depth_m)
         step_m = max(FINEST_STEP_M, max_depth_m / LEVELS)
-        levels = np.rint(np.where(usable, depth, 0.0) / step_m).astype(np.uint16)
+        levels = usable_levels(image.depth, np.float32(max_depth_m), np.float32(step_m))
         bgr = cv2.cvtColor(image.colour, cv2.COLOR_RGB2BGR)
         _, jpeg = cv2.imencode(".jpg", bgr, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
         return cls(
@@ -55,7 +55,7 @@ class GroundKeyframe:
             isal_zlib.compress(levels, 1),
             jpeg.tobytes(),
             step_m,
-            (depth.shape[0], depth.shape[1]),
+            levels.shape,
         )
 
     def depth(self) -> NDArray[np.float32]:
@@ -70,13 +70,41 @@ class GroundKeyframe:
         return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB).astype(np.uint8)
 
 
-def near_silhouette(depth: NDArray[np.float32]) -> NDArray[np.bool_]:
-    """Pixels beside a jump in depth: there the sensor mixes fore- and background."""
-    jump = np.zeros(depth.shape, bool)
-    across = np.abs(np.diff(depth, axis=1)) > 0.05 * depth[:, 1:]
-    down = np.abs(np.diff(depth, axis=0)) > 0.05 * depth[1:]
-    jump[:, 1:] |= across
-    jump[:, :-1] |= across
-    jump[1:] |= down
-    jump[:-1] |= down
-    return jump
+@njit(cache=True, nogil=True, error_model="numpy")
+def usable_levels(
+    depth: NDArray[np.float32], max_depth_m: np.float32, step_m: np.float32
+) -> NDArray[np.uint16]:
+    """Depth in steps, 0 where there is none to use.
+
+    Beside a jump in depth the sensor mixes fore- and background: pixels on both sides are left
+    out, like those that are too far.
+
+    Args:
+        depth: (height, width) [m], NaN where missing.
+        max_depth_m: Depth beyond this is not used.
+        step_m: Unit of the result [m].
+    """
+    height, width = depth.shape
+    levels = np.zeros(depth.shape, np.uint16)
+    for y in range(height):
+        above, below = max(y - 1, 0), min(y + 1, height - 1)
+        for x in range(width):
+            here = depth[y, x]
+            if not (here > 0 and here <= max_depth_m):
+                continue
+            left, right = depth[y, max(x - 1, 0)], depth[y, min(x + 1, width - 1)]
+            if (
+                _jumps(left, here)
+                or _jumps(here, right)
+                or _jumps(depth[above, x], here)
+                or _jumps(here, depth[below, x])
+            ):
+                continue
+            levels[y, x] = np.uint16(np.rint(here / step_m))
+    return levels
+
+
+@njit(cache=True, nogil=True)
+def _jumps(one: np.float32, next_one: np.float32) -> bool:
+    """Whether depth changes between neighbours; where one is missing, nobody knows."""
+    return bool(abs(next_one - one) > JUMP * next_one)

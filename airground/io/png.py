@@ -108,29 +108,59 @@ def undo_filters(filtered: NDArray, rows: NDArray, pixel_bytes: int) -> bool:
     Returns:
         False where a filter's number has no meaning.
     """
-    height, width = rows.shape
-    for y in range(height):
-        kind = filtered[y, 0]
+    for y in range(len(rows)):
+        kind, line, row = filtered[y, 0], filtered[y, 1:], rows[y]
         if kind > 4:
             return False
-        for channel in range(pixel_bytes):
-            left, corner = 0, 0
-            for x in range(channel, width, pixel_bytes):
-                value = int(filtered[y, x + 1])
-                if kind == 1:
-                    value += left
-                elif kind != 0:
-                    above = int(rows[y - 1, x]) if y > 0 else 0
-                    if kind == 2:
-                        value += above
-                    elif kind == 3:
-                        value += (left + above) // 2
-                    else:
-                        value += _nearest(left, above, corner)
-                    corner = above
-                left = value & 255
-                rows[y, x] = left
+        if kind == 0 or (kind == 2 and y == 0):
+            row[:] = line
+        elif kind == 1:
+            _add_left(line, row, pixel_bytes)
+        elif kind == 2:
+            _add_above(line, rows[y - 1], row)
+        else:
+            above = rows[y - 1] if y > 0 else np.zeros_like(row)
+            _add_guess(line, above, row, pixel_bytes, kind == 3)
     return True
+
+
+@njit(cache=True, nogil=True)
+def _add_left(line: NDArray, row: NDArray, pixel_bytes: int) -> None:
+    """Filter 1, which our recordings use throughout: sums of as many channels side by side."""
+    if pixel_bytes == 3:
+        red = green = blue = 0
+        for x in range(0, len(row), 3):
+            red, green, blue = red + line[x], green + line[x + 1], blue + line[x + 2]
+            row[x], row[x + 1], row[x + 2] = red & 255, green & 255, blue & 255
+    elif pixel_bytes == 2:
+        first = second = 0
+        for x in range(0, len(row), 2):
+            first, second = first + line[x], second + line[x + 1]
+            row[x], row[x + 1] = first & 255, second & 255
+    else:
+        value = 0
+        for x in range(len(row)):
+            value += line[x]
+            row[x] = value & 255
+
+
+@njit(cache=True, nogil=True)
+def _add_above(line: NDArray, above: NDArray, row: NDArray) -> None:
+    """Filter 2."""
+    for x in range(len(row)):
+        row[x] = (line[x] + above[x]) & 255
+
+
+@njit(cache=True, nogil=True)
+def _add_guess(line: NDArray, above: NDArray, row: NDArray, pixel_bytes: int, mean: bool) -> None:
+    """Filters 3, the mean of left and above, and 4, the nearest of left, above and corner."""
+    for channel in range(pixel_bytes):
+        left, corner = 0, 0
+        for x in range(channel, len(row), pixel_bytes):
+            over = int(above[x])
+            guess = (left + over) // 2 if mean else _nearest(left, over, corner)
+            left, corner = (int(line[x]) + guess) & 255, over
+            row[x] = left
 
 
 @njit(cache=True, nogil=True, inline="always")

@@ -77,11 +77,19 @@ class HeadingEstimator:
 
     def _weights(self) -> NDArray[np.float64]:
         """(BINS,) weight of each direction: a bell around the densest, a few kernels wide."""
-        distance = np.minimum(np.arange(BINS), BINS - np.arange(BINS)) * 360.0 / BINS
-        kernel = np.exp(-0.5 * (distance / KERNEL_DEG) ** 2)
-        density = np.fft.irfft(np.fft.rfft(self._counts) * np.fft.rfft(kernel), BINS)
-        bell = np.exp(-0.5 * (distance / (3 * KERNEL_DEG)) ** 2)
-        return np.roll(bell, int(np.argmax(density)))
+        density = np.fft.irfft(np.fft.rfft(self._counts) * _SMOOTHING, BINS)
+        return np.roll(_BELL, int(np.argmax(density)))
+
+
+def _bell(sigma_deg: float) -> NDArray[np.float64]:
+    """(BINS,) Gaussian over the circle, around the first bin."""
+    distance = np.minimum(np.arange(BINS), BINS - np.arange(BINS)) * 360.0 / BINS
+    return np.exp(-0.5 * (distance / sigma_deg) ** 2)
+
+
+# Every image asks for the heading: what never changes is made once.
+_SMOOTHING = np.fft.rfft(_bell(KERNEL_DEG))
+_BELL = _bell(3 * KERNEL_DEG)
 
 
 def _elsewhere(place: SE3, pose: SE3) -> bool:

@@ -18,6 +18,7 @@ from evaluation.bench.probe import probe
 from evaluation.bench.row import Contender, Floor, Speed, Work
 from evaluation.bench.rows import BY_NAME
 from evaluation.bench.sampler import Turn, take_turn
+from evaluation.environment import settle
 
 
 @dataclass(frozen=True)
@@ -119,6 +120,7 @@ def open_lane(path: Path, whole: bool) -> tuple[Lane, Opened]:
     speed = probe()
     recording, config = Recording.open(path), Config()
     warm_up_mapping(config, np.random.default_rng(0))
+    settle()
     kept: list[tuple[Material, Played | None]] = []
     peak = peak_memory_mib(lambda: kept.append(play(recording, config, whole)))
     material, played = kept[0]

@@ -152,17 +152,42 @@ class _Grid:
         return self._grid.extract_point_cloud(self._weight - 0.5)
 
 
-def extract_ground(material: Material) -> Work:
-    """Open3D: the points of its own voxel block grid, which holds the same field."""
-    field = material.ground_field
-    grid = o3d.t.geometry.VoxelBlockGrid(
+def _ground_grid(voxel_m: float) -> o3d.t.geometry.VoxelBlockGrid:
+    """Open3D's field for what the ground robot saw."""
+    return o3d.t.geometry.VoxelBlockGrid(
         attr_names=ATTRIBUTES,
         attr_dtypes=(o3d.core.float32,) * 3,
         attr_channels=[o3d.core.SizeVector([n]) for n in (1, 1, 3)],
-        voxel_size=field.voxel_m,
+        voxel_size=voxel_m,
         block_resolution=BLOCK,
         block_count=FIRST_BLOCKS,
     )
+
+
+def fuse_keyframe(material: Material) -> Work:
+    """Open3D: an image of the ground robot into a field of hashed blocks, with its colours."""
+    image, config = material.ground_image, material.config.ground_mapping
+    grid = _ground_grid(config.voxel_m)
+    T_camera_ground = material.sighting.T_ground_camera.inverse()
+    motion = o3d.core.Tensor.from_numpy(T_camera_ground.matrix())
+    intrinsics = o3d.core.Tensor.from_numpy(material.ground_camera.matrix())
+    reach = (1.0, config.max_depth_m, config.truncation_m / config.voxel_m)
+
+    def fuse() -> None:
+        seen = np.nan_to_num(image.depth, nan=0.0)
+        depth = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(seen))
+        levels = image.colour.astype(np.float32)
+        colour = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(levels))
+        blocks = grid.compute_unique_block_coordinates(depth, intrinsics, motion, *reach)
+        grid.integrate(blocks, depth, colour, intrinsics, motion, *reach)
+
+    return Work(fuse)
+
+
+def extract_ground(material: Material) -> Work:
+    """Open3D: the points of its own voxel block grid, which holds the same field."""
+    field = material.ground_field
+    grid = _ground_grid(field.voxel_m)
     rows, _ = grid.hashmap().activate(o3d.core.Tensor.from_numpy(field.places))
     filled = field.tsdf[..., None], field.weight[..., None], field.colour
     for name, values in zip(ATTRIBUTES, filled, strict=True):

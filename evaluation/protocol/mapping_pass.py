@@ -22,6 +22,7 @@ from airground.io.recording import Recording
 from airground.pipeline import Mapping, Sighting, sight
 from airground.tracking import TrackedFrame, Trackers
 from airground.warm_up import warm_up
+from evaluation.environment import settle
 from evaluation.protocol.setups import Setup
 from evaluation.runs.front_ends import front_ends_for
 from evaluation.runs.timing import STAGE_OF, timed
@@ -72,6 +73,7 @@ def map_recording(recording: Recording, truth: Truth, setup: Setup, seed: int) -
     fused: list[DepthMap] = []
     # Compiling is no part of what is timed.
     warm_up(setup.config, np.random.default_rng(0))
+    settle()
     started = time.perf_counter()
     for event, duration_ms in timed(_events(trackers.frames(recording.messages()), mapping)):
         if type(event) in STAGE_OF:

@@ -15,6 +15,7 @@ from airground.io.recording import Recording
 from airground.link.channel import Receiver
 from airground.tracking import TrackedFrame
 from airground.warm_up import warm_up_mapping
+from evaluation.environment import settle
 from evaluation.protocol.experiment import peak_memory_mib
 from evaluation.protocol.setups import Setup
 from evaluation.realtime.arrivals import in_order
@@ -63,6 +64,7 @@ def run_live(
         ]
         _step_back()
         warm_up_mapping(setup.config, np.random.default_rng(0))
+        settle()
         for robot in robots:
             robot.wait_until_ready()
         lived = Lived(_clock(recording, playback.rate))

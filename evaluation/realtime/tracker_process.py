@@ -18,7 +18,7 @@ from airground.io.recording import Recording
 from airground.link.channel import Sender
 from airground.slam.warm_up import warm_up_slam
 from airground.tracking import RobotTracker
-from evaluation.environment import prepare
+from evaluation.environment import prepare, settle
 from evaluation.protocol.experiment import peak_memory_mib
 from evaluation.protocol.setups import Setup
 from evaluation.realtime.clock import PlaybackClock
@@ -104,6 +104,7 @@ def _report(task: TrackerTask, pipe: Connection) -> TrackerReport:
     uplink = Uplink(sender, radio, task.radio.jpeg_quality if task.radio else None)
     if task.robot.name.lower() in task.setup.slam_robots():
         warm_up_slam(np.random.default_rng(0))
+    settle()
     pipe.send(None)
     clock: PlaybackClock = pipe.recv()
     played = play(recording, task.robot, tracker, clock, task.waiting_frames, uplink.offer)

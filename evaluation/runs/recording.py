@@ -26,6 +26,7 @@ from airground.io.tum import write_tum
 from airground.pipeline import Pipeline, Sighting, sight
 from airground.tracking import TrackedFrame
 from airground.warm_up import warm_up_mapping
+from evaluation.environment import settle
 from evaluation.protocol.experiment import peak_memory_mib
 from evaluation.protocol.setups import Setup
 from evaluation.realtime.drops import DropList, nothing_dropped
@@ -87,6 +88,7 @@ def run_recording(
     with TrackingProcess(task) if apart else nullcontext(TrackingHere(task)) as tracking:
         # Compiling is no part of what is timed.
         warm_up_mapping(setup.config, np.random.default_rng(0))
+        settle()
         tracking.wait_until_ready()
         started = time.perf_counter()
         measure.run(drops.received(tracking.frames()))

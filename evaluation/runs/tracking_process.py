@@ -15,7 +15,7 @@ from airground.core.cloud import Source
 from airground.errors import AirgroundError
 from airground.io.recording import Recording
 from airground.tracking import TrackedFrame
-from evaluation.environment import prepare
+from evaluation.environment import prepare, settle
 from evaluation.protocol.experiment import peak_memory_mib
 from evaluation.protocol.setups import Setup
 from evaluation.realtime.drops import DropList
@@ -108,6 +108,7 @@ def _track(order: _Order, ring: FrameRing, pipe: Connection) -> None:
         truth = Truth.open(order.recording)
         here = TrackingHere(TrackingTask(recording, truth, order.setup, order.seed, order.drops))
         here.wait_until_ready()
+        settle()
         pipe.send(None)
         pipe.recv()
         started_s = time.process_time()

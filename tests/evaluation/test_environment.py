@@ -20,6 +20,29 @@ for _ in range(20):
     frames = [np.ones(150_000) for _ in range(8)]
 print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
 """
+SETTLED = """
+import gc, weakref
+from evaluation.environment import settle
+
+class Ring:
+    pass
+
+def made():
+    ring = Ring()
+    ring.itself = ring
+    return weakref.ref(ring)
+
+alive = [[number] for number in range(300_000)]
+looked_through = [len(gc.get_objects())]
+settle()
+looked_through.append(len(gc.get_objects()))
+frozen = gc.get_freeze_count()
+new = [[number] for number in range(10)]
+settle()
+ring = made()
+gc.collect()
+print(*looked_through, gc.get_freeze_count() == frozen, ring() is None)
+"""
 SETTINGS = ("MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_")
 
 
@@ -38,6 +61,14 @@ def test_children_keep_what_they_free(monkeypatch: pytest.MonkeyPatch) -> None:
         pytest.skip("the allocator of this machine keeps what is freed anyway")
     prepare()
     assert faults(dict(os.environ)) < usual / 10
+
+
+def test_what_is_there_to_stay_is_looked_through_once() -> None:
+    command = [sys.executable, "-c", SETTLED]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    before, after, once, garbage_goes = done.stdout.split()
+    assert int(before) > 300_000 > 100 * int(after)
+    assert (once, garbage_goes) == ("True", "True")
 
 
 def test_threads_are_set_for_every_library(monkeypatch: pytest.MonkeyPatch) -> None:
