@@ -97,14 +97,14 @@ def _report(task: TrackerTask, pipe: Connection) -> TrackerReport:
     truth = Truth.open(task.recording)
     watched = front_ends_for(task.setup, recording, truth, front_end_rng(task.seed))
     tracker = RobotTracker(task.robot, recording.calibration(task.robot), watched.of(task.robot))
+    if task.robot.name.lower() in task.setup.slam_robots():
+        warm_up_slam(np.random.default_rng(0))
+    settle()
     radio = None
     if task.radio is not None:
         radio = Radio(task.radio, np.random.default_rng([task.seed, 1]))
     sender = Sender(task.address, task.frames_under_way)
     uplink = Uplink(sender, radio, task.radio.jpeg_quality if task.radio else None)
-    if task.robot.name.lower() in task.setup.slam_robots():
-        warm_up_slam(np.random.default_rng(0))
-    settle()
     pipe.send(None)
     clock: PlaybackClock = pipe.recv()
     played = play(recording, task.robot, tracker, clock, task.waiting_frames, uplink.offer)
