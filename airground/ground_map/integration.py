@@ -1,4 +1,6 @@
-"""A depth image into the distance field: each voxel's mean signed distance (Curless and Levoy).
+"""A depth image into the distance field of the ground map (Sec. IV).
+
+A voxel holds its mean signed distance to the surface, cut (Curless and Levoy, SIGGRAPH 1996).
 
 Open3D's own integration reads the pixel to the left of and above where a voxel falls, half a
 pixel off in the mean: a floor seen at a shallow angle then lies too low, and everything a
@@ -29,7 +31,7 @@ def integrate(
     voxel_m: float,
     truncation_m: float,
 ) -> None:
-    """Add one view to a field, in the blocks that it touches.
+    """Add one view to a field in the frame `map`, in the blocks that it touches.
 
     Args:
         grid: With the attributes that `BlockedField` names; changed.
