@@ -21,14 +21,10 @@ from airground.core.cloud import PointCloud
 from airground.core.messages import GroundImage
 from airground.core.se3 import SE3, rotation_angle
 from airground.core.trajectory import Trajectory
+from airground.ground_map.blocked_field import BlockedField, empty_grid
 from airground.ground_map.integration import integrate
 from airground.ground_map.keyframe import GroundKeyframe
-from airground.ground_map.surface_points import (
-    ATTRIBUTES,
-    BLOCK,
-    BlockedField,
-    surface_points,
-)
+from airground.ground_map.surface_points import surface_points
 
 _FIRST_BLOCKS = 10_000
 
@@ -46,7 +42,7 @@ class GroundMap:
         self._camera = camera
         self._intrinsics = o3d.core.Tensor.from_numpy(camera.matrix())
         self._keyframes: list[GroundKeyframe] = []
-        self._grid = self._empty_grid()
+        self._grid = empty_grid(self._config.voxel_m, _FIRST_BLOCKS)
         self._fused = 0
         self._cloud: PointCloud | None = None
 
@@ -99,7 +95,11 @@ class GroundMap:
         ):
             return False
         self._keyframes = corrected
-        self._grid, self._fused, self._cloud = self._empty_grid(), 0, None
+        self._grid, self._fused, self._cloud = (
+            empty_grid(self._config.voxel_m, _FIRST_BLOCKS),
+            0,
+            None,
+        )
         return True
 
     def cloud(self) -> PointCloud:
@@ -113,16 +113,6 @@ class GroundMap:
     def field(self) -> BlockedField:
         """The distance field so far; fusing further keyframes changes it."""
         return BlockedField.of(self._grid, self._config.voxel_m)
-
-    def _empty_grid(self) -> o3d.t.geometry.VoxelBlockGrid:
-        return o3d.t.geometry.VoxelBlockGrid(
-            attr_names=ATTRIBUTES,
-            attr_dtypes=(o3d.core.float32,) * 3,
-            attr_channels=[o3d.core.SizeVector([n]) for n in (1, 1, 3)],
-            voxel_size=self._config.voxel_m,
-            block_resolution=BLOCK,
-            block_count=_FIRST_BLOCKS,
-        )
 
     def _fuse(self, keyframe: GroundKeyframe) -> None:
         """Put a keyframe into the distance field."""

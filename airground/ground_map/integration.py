@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from airground.ground_map.surface_points import ATTRIBUTES, BLOCK, COLOUR_SCALE
+from airground.ground_map.blocked_field import ATTRIBUTES, BLOCK, COLOUR_SCALE
 
 ONE, HALF, SCALE = np.float32(1.0), np.float32(0.5), np.float32(COLOUR_SCALE)
 

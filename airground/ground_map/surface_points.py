@@ -8,65 +8,20 @@ runs through voxels exactly.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-import open3d as o3d
 from numba import njit, prange
 from numpy.typing import NDArray
 
 from airground.core.cloud import PointCloud
+from airground.ground_map.blocked_field import BLOCK, COLOUR_SCALE, BlockedField
 
-ATTRIBUTES = ("tsdf", "weight", "color")
-"""What a voxel holds, as Open3D calls it."""
-BLOCK = 8
-"""Voxels along each side of a block."""
 BEFORE, BEHIND = 1, 2
 """What a block's points need of the blocks around: an edge's far end, and its gradient."""
 SIDE = BEFORE + BLOCK + BEHIND
 LAYER, VOXELS = BLOCK**2, BLOCK**3
-COLOUR_SCALE = 255.0
-"""Open3D keeps colours given as float32 so many times larger."""
 _BITS, _BIAS = 21, 1 << 20
 """A block's place is one word of three such fields, each shifted to be positive."""
 _X, _Y, _Z = 1, 1 << _BITS, 1 << (2 * _BITS)
-
-
-@dataclass(frozen=True, eq=False)
-class BlockedField:
-    """A truncated signed distance field in blocks; arrays are used as they are, not copied.
-
-    Attributes:
-        places: (N, 3) int32, x, y, z of each block [blocks].
-        rows: (N,) int32, where the block lies in the arrays below.
-        tsdf: (C, 8, 8, 8) float32, by z, y, x; positive before the surface.
-        weight: (C, 8, 8, 8) float32, how many keyframes a voxel has.
-        colour: (C, 8, 8, 8, 3) float32, their mean, times `COLOUR_SCALE`.
-        voxel_m: Side of a voxel [m].
-    """
-
-    places: NDArray[np.int32]
-    rows: NDArray[np.int32]
-    tsdf: NDArray[np.float32]
-    weight: NDArray[np.float32]
-    colour: NDArray[np.float32]
-    voxel_m: float
-
-    @classmethod
-    def of(cls, grid: o3d.t.geometry.VoxelBlockGrid, voxel_m: float) -> BlockedField:
-        """What a grid with attributes tsdf, weight and color holds now; no copy."""
-        rows = grid.hashmap().active_buf_indices().numpy()
-        tsdf, weight, colour = (grid.attribute(name).numpy() for name in ATTRIBUTES)
-        places = grid.hashmap().key_tensor().numpy()[rows]
-        return cls(places, rows.astype(np.int32), tsdf[..., 0], weight[..., 0], colour, voxel_m)
-
-    def copy(self) -> BlockedField:
-        """The same in memory of its own, which nobody fuses into any more."""
-        tsdf, weight, colour = (
-            values[self.rows] for values in (self.tsdf, self.weight, self.colour)
-        )
-        rows = np.arange(len(self.rows), dtype=np.int32)
-        return BlockedField(self.places.copy(), rows, tsdf, weight, colour, self.voxel_m)
 
 
 def surface_points(field: BlockedField, min_weight: float) -> PointCloud:

@@ -31,7 +31,7 @@ from airground.core.surface import AerialSurface, DepthMap
 from airground.dense.view_selection import PosedImage
 from airground.errors import InputError
 from airground.ground_map import GroundMap
-from airground.ground_map.surface_points import BlockedField
+from airground.ground_map.blocked_field import BlockedField
 from airground.io.recording import Recording
 from airground.pipeline import Pipeline, Sighting, sight
 from evaluation.bench.memory import resident_mib

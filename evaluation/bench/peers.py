@@ -17,7 +17,7 @@ from airground.core.surface import DepthMap
 from airground.dense.plane_sweep import halved, inverse_depth_planes
 from airground.dense.scene_extent import scene_extent
 from airground.dense.volume import Volume
-from airground.ground_map.surface_points import ATTRIBUTES, BLOCK
+from airground.ground_map.blocked_field import ATTRIBUTES, BLOCK, empty_grid
 from evaluation.bench.dense_rows import with_paper_planes
 from evaluation.bench.localization_rows import Maps, paper_sized
 from evaluation.bench.map_rows import start_of
@@ -152,22 +152,10 @@ class _Grid:
         return self._grid.extract_point_cloud(self._weight - 0.5)
 
 
-def _ground_grid(voxel_m: float) -> o3d.t.geometry.VoxelBlockGrid:
-    """Open3D's field for what the ground robot saw."""
-    return o3d.t.geometry.VoxelBlockGrid(
-        attr_names=ATTRIBUTES,
-        attr_dtypes=(o3d.core.float32,) * 3,
-        attr_channels=[o3d.core.SizeVector([n]) for n in (1, 1, 3)],
-        voxel_size=voxel_m,
-        block_resolution=BLOCK,
-        block_count=FIRST_BLOCKS,
-    )
-
-
 def fuse_keyframe(material: Material) -> Work:
     """Open3D: an image of the ground robot into a field of hashed blocks, with its colours."""
     image, config = material.ground_image, material.config.ground_mapping
-    grid = _ground_grid(config.voxel_m)
+    grid = empty_grid(config.voxel_m, FIRST_BLOCKS)
     T_camera_ground = material.sighting.T_ground_camera.inverse()
     motion = o3d.core.Tensor.from_numpy(T_camera_ground.matrix())
     intrinsics = o3d.core.Tensor.from_numpy(material.ground_camera.matrix())
@@ -187,7 +175,7 @@ def fuse_keyframe(material: Material) -> Work:
 def extract_ground(material: Material) -> Work:
     """Open3D: the points of its own voxel block grid, which holds the same field."""
     field = material.ground_field
-    grid = _ground_grid(field.voxel_m)
+    grid = empty_grid(field.voxel_m, FIRST_BLOCKS)
     rows, _ = grid.hashmap().activate(o3d.core.Tensor.from_numpy(field.places))
     filled = field.tsdf[..., None], field.weight[..., None], field.colour
     for name, values in zip(ATTRIBUTES, filled, strict=True):

@@ -14,8 +14,8 @@ from airground.core.camera import PinholeCamera
 from airground.core.messages import GroundImage
 from airground.core.se3 import SE3
 from airground.ground_map import GroundMap
+from airground.ground_map.blocked_field import BLOCK, COLOUR_SCALE, BlockedField, empty_grid
 from airground.ground_map.integration import add_view, integrate
-from airground.ground_map.surface_points import ATTRIBUTES, BLOCK, COLOUR_SCALE, BlockedField
 
 CAMERA = PinholeCamera(64, 48, 52.0, 52.0, 31.5, 23.5)
 VOXEL_M, TRUNCATION_M = 0.05, 0.2
@@ -75,13 +75,7 @@ def test_every_voxel_reads_the_pixel_it_falls_on(seed: int) -> None:
 
 
 def test_open3d_given_half_a_pixel_more_finds_the_same_field() -> None:
-    def grid() -> o3d.t.geometry.VoxelBlockGrid:
-        channels = [o3d.core.SizeVector([n]) for n in (1, 1, 3)]
-        return o3d.t.geometry.VoxelBlockGrid(
-            ATTRIBUTES, (o3d.core.float32,) * 3, channels, VOXEL_M, BLOCK, 10
-        )
-
-    ours, theirs = grid(), grid()
+    ours, theirs = (empty_grid(VOXEL_M, 10) for _ in range(2))
     rng = np.random.default_rng(0)
     intrinsics, shifted = CAMERA.matrix(), CAMERA.matrix()
     shifted[:2, 2] += 0.5

@@ -13,13 +13,8 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from airground.core.camera import PinholeCamera
-from airground.ground_map.surface_points import (
-    BLOCK,
-    COLOUR_SCALE,
-    BlockedField,
-    neighbours,
-    surface_points,
-)
+from airground.ground_map.blocked_field import BLOCK, COLOUR_SCALE, BlockedField, empty_grid
+from airground.ground_map.surface_points import neighbours, surface_points
 
 CAMERA = PinholeCamera(40, 30, 34.0, 34.0, 19.5, 14.5)
 VOXEL_M = 0.02
@@ -27,14 +22,7 @@ VOXEL_M = 0.02
 
 def fused_steps(seed: int) -> o3d.t.geometry.VoxelBlockGrid:
     """Noisy images of a step, from poses close by."""
-    grid = o3d.t.geometry.VoxelBlockGrid(
-        attr_names=("tsdf", "weight", "color"),
-        attr_dtypes=(o3d.core.float32,) * 3,
-        attr_channels=[o3d.core.SizeVector([n]) for n in (1, 1, 3)],
-        voxel_size=VOXEL_M,
-        block_resolution=BLOCK,
-        block_count=10,
-    )
+    grid = empty_grid(VOXEL_M, 10)
     rng = np.random.default_rng(seed)
     intrinsics = o3d.core.Tensor.from_numpy(CAMERA.matrix())
     for _ in range(3):
