@@ -153,9 +153,9 @@ class GroundMapping(Section):
     """The distance field ends this far from the surface [m]."""
     min_keyframes: Count = 3
     """A surface that fewer keyframes saw is noise."""
-    follow_distance_m: Positive = 0.005
+    follow_distance_m: Positive = 0.002
     """The map is fused anew once SLAM moved one of its keyframes this far [m] ..."""
-    follow_angle_deg: Positive = 0.2
+    follow_angle_deg: Positive = 0.05
     """... or turned it this much [deg]."""
 
 

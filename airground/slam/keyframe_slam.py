@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.config import KeyframeSlam as Parameters
-from airground.core.messages import ImuSamples, RobotCalibration
+from airground.core.messages import RobotCalibration
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.slam.culling import KeyframeCuller
@@ -26,6 +26,7 @@ from airground.slam.front_end import TrackedCorners
 from airground.slam.geometry.pose_estimation import PoseFit
 from airground.slam.image_turn import ImageTurn
 from airground.slam.inertial.alignment import InertialAlignment
+from airground.slam.inertial.stationarity import Rest
 from airground.slam.keyframe_choice import KeyframeChoice
 from airground.slam.local_mapping import LocalMapper, NewKeyframe
 from airground.slam.loop_closure import LoopCloser
@@ -35,7 +36,7 @@ from airground.slam.pose_covariance import with_shared_errors
 from airground.slam.recovery import Recovery
 from airground.slam.rig_state import RigState
 from airground.slam.sparse_map import SparseMap
-from airground.slam.starts import MovingStart
+from airground.slam.starts import REST_WINDOW_NS, MovingStart
 from airground.slam.tracked_path import TrackedPath
 
 PATIENCE = 2
@@ -107,9 +108,6 @@ class KeyframeSlam:
         self._choice = KeyframeChoice(self.map, *own)
         self._culler = KeyframeCuller(self.map, self.adjuster, self._recovery, self.path, *own)
 
-    def add_imu(self, samples: ImuSamples) -> None:
-        self.motion.add(samples)
-
     @property
     def begun(self) -> bool:
         """Whether there is a map to track in."""
@@ -162,9 +160,7 @@ class KeyframeSlam:
             fit = self._recover(frame, prediction)
         self._move_on(frame, prediction, fit)
         self._adrift = fit is None and (self._adrift or cut or not prediction.inertial)
-        if self._in_doubt():
-            return None, False
-        if fit is None and (self._adrift or len(self.path)):
+        if self._in_doubt() or (fit is None and (self._adrift or len(self.path))):
             return None, False
         timed = self.metric and self.calibration.imu is not None
         if self._choice.wanted(self.tracker, self.state, frame.stamp_ns, timed):
@@ -199,19 +195,26 @@ class KeyframeSlam:
     def make_inertial(self, alignment: InertialAlignment) -> None:
         """Make the map metric and upright; from now on the accelerometer counts."""
         self.make_upright(alignment.scale, alignment.R_map_v)
-        self.map.set_motion(
-            alignment.velocities, alignment.gyro_biases, alignment.accelerometer_biases
-        )
+        self.map.set_motion(alignment)
         self.state = self.map.keyframes[-1].state
         self.inertial = True
+        self.adjust_all()
+
+    def stand_still(self, frame: Frame, rest: Rest) -> None:
+        """The robot stood still up to the newest image: from now on the accelerometer counts."""
+        self.state = self.state.standing(rest)
+        self.map.stand_still(frame.stamp_ns - REST_WINDOW_NS, rest)
+        self.inertial = True
+        if self.map.keyframes[-1].stamp_ns != frame.stamp_ns:
+            self._insert(frame, still=True)
         self.adjust_all()
 
     def covariance(
         self, fit: PoseFit, scale_sigma: float, tilt_sigma: float
     ) -> NDArray[np.float64]:
         """(6, 6) of the newest pose: that of the image within the map, and of the map."""
-        within = fit.covariance + self._keyframe_covariance
         lever = fit.T_map_camera.translation - self.map.keyframes[0].state.position
+        within = fit.covariance + self._keyframe_covariance
         return with_shared_errors(within, lever, scale_sigma, tilt_sigma)
 
     def unseen_s(self) -> float:
@@ -304,18 +307,15 @@ class KeyframeSlam:
     def _move_on(self, frame: Frame, prediction: Prediction, fit: PoseFit | None) -> None:
         """The state at this image: as measured, or else as predicted."""
         assert self.stamp_ns is not None
-        before, seconds = self.state, (frame.stamp_ns - self.stamp_ns) * 1e-9
-        state = prediction.state
-        coasted_s = (frame.stamp_ns - self._seen_ns) * 1e-9
+        before, followed = self.state, self._seen_ns == self.stamp_ns
         if fit is not None:
-            state = state.posed(fit.T_map_camera @ self.T_rig_camera.inverse())
-            if not prediction.inertial:
-                step = state.position - before.position
-                followed = self._seen_ns == self.stamp_ns
-                state = replace(state, velocity=step / seconds if followed else np.zeros(3))
+            T_map_rig = fit.T_map_camera @ self.T_rig_camera.inverse()
+            seconds = (frame.stamp_ns - self.stamp_ns) * 1e-9 if followed else None
+            state = self.motion.measured(before, prediction, T_map_rig, seconds)
             self._seen_ns = frame.stamp_ns
         else:
-            state = self.motion.coasted(before, prediction, coasted_s)
+            unseen_s = (frame.stamp_ns - self._seen_ns) * 1e-9
+            state = self.motion.coasted(before, prediction, unseen_s)
         self._turn = before.rotation.T @ state.rotation
         self.state, self.stamp_ns = state, frame.stamp_ns
 

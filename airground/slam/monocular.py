@@ -51,7 +51,7 @@ class MonocularSlam:
 
     def add_imu(self, samples: ImuSamples) -> None:
         """Take the inertial measurements up to the next image."""
-        self._slam.add_imu(samples)
+        self._slam.motion.add(samples)
 
     def track(self, image: MavImage) -> TrackedPose:
         """Where the camera was when `image` was taken."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.messages import ImuNoise, ImuSamples
-from airground.core.se3 import nearest_rotation
+from airground.core.se3 import SE3, nearest_rotation
 from airground.slam.inertial.preintegration import ImuBuffer, Preintegration
 from airground.slam.rig_state import RigState
 
@@ -108,6 +108,25 @@ class MotionModel:
         )
         predicted = replace(state, rotation=rotation, position=position, velocity=velocity)
         return Prediction(predicted, ROTATION_SIGMA, True)
+
+    def measured(
+        self, before: RigState, prediction: Prediction, T_map_rig: SE3, seconds: float | None
+    ) -> RigState:
+        """The state at an image that gave a pose.
+
+        Args:
+            before: The state at the image before.
+            prediction: From there.
+            T_map_rig: As measured.
+            seconds: Since the image before; None if that gave no pose, so that the way from
+                there tells no velocity.
+        """
+        state = prediction.state.posed(T_map_rig)
+        if prediction.inertial:
+            return state
+        if seconds is None:
+            return replace(state, velocity=np.zeros(3))
+        return replace(state, velocity=(state.position - before.position) / seconds)
 
     def coasted(self, before: RigState, prediction: Prediction, unseen_s: float) -> RigState:
         """The state at an image that shows nothing: a robot goes on for a while.

@@ -12,7 +12,7 @@ from airground.slam.frame import Frame, require_order
 from airground.slam.front_end import TrackedPose, Tracking
 from airground.slam.keyframe_slam import KeyframeSlam
 from airground.slam.pose_covariance import DEPTH_SCALE_SIGMA, LEVEL_SIGMA
-from airground.slam.starts import level_start
+from airground.slam.starts import StandStill, level_start
 
 HAND_HELD = 1.5
 """A depth camera without an IMU is in somebody's hand: it turns while its rows are read one after
@@ -44,11 +44,12 @@ class RgbdSlam:
             calibration, parameters, rng, parameters.depth_noise_per_m, parameters.max_depth_m
         )
         self._slam.metric = True
+        self._standing = StandStill(calibration)
         self._last_ns: int | None = None
 
     def add_imu(self, samples: ImuSamples) -> None:
         """Take the inertial measurements up to the next image."""
-        self._slam.add_imu(samples)
+        self._slam.motion.add(samples)
 
     def track(self, image: GroundImage) -> TrackedPose:
         """Where the camera was when `image` was taken."""
@@ -62,6 +63,11 @@ class RgbdSlam:
         fit, corrected = slam.track(frame)
         if fit is None:
             return TrackedPose(image.stamp_ns, Tracking.LOST, None)
+        if not slam.inertial:
+            rest = self._standing.observe(image.stamp_ns, slam.state.position, slam.motion)
+            if rest is not None:
+                slam.stand_still(frame, rest)
+                corrected = True
         slam.note(image.stamp_ns)
         return TrackedPose(
             image.stamp_ns,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.se3 import SE3, nearest_rotation
+from airground.slam.inertial.stationarity import Rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,15 @@ class RigState:
     @cached_property
     def _pose(self) -> SE3:
         return SE3(nearest_rotation(self.rotation), self.position)
+
+    def standing(self, rest: Rest) -> RigState:
+        """The same pose, at rest, with the biases that the IMU shows there."""
+        return replace(
+            self,
+            velocity=np.zeros(3),
+            gyro_bias=rest.gyro,
+            accelerometer_bias=rest.accelerometer_bias,
+        )
 
     def posed(self, T_map_rig: SE3) -> RigState:
         """The same state at another pose."""

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.se3 import SE3
+from airground.slam.inertial.alignment import InertialAlignment
+from airground.slam.inertial.stationarity import Rest
 from airground.slam.rig_state import RigState
 
 FIRST_POINTS = 4096
@@ -173,18 +175,24 @@ class SparseMap:
         low, high = np.percentile(z, [DEPTH_RANGE_PERCENT, 100 - DEPTH_RANGE_PERCENT])
         return (float(low), float(high)) if low > 0 else None
 
-    def set_motion(
-        self, velocities: NDArray, gyro_biases: NDArray, accelerometer_biases: NDArray
-    ) -> None:
-        """Give the newest keyframes (K, 3) velocities and biases each."""
-        newest = self.keyframes[-len(velocities) :]
+    def set_motion(self, alignment: InertialAlignment) -> None:
+        """Give the newest keyframes the velocities and biases that were found for them."""
+        newest = self.keyframes[-len(alignment.velocities) :]
         for n, keyframe in enumerate(newest):
             keyframe.state = replace(
                 keyframe.state,
-                velocity=velocities[n],
-                gyro_bias=gyro_biases[n],
-                accelerometer_bias=accelerometer_biases[n],
+                velocity=alignment.velocities[n],
+                gyro_bias=alignment.gyro_biases[n],
+                accelerometer_bias=alignment.accelerometer_biases[n],
             )
+
+    def stand_still(self, since_ns: int, rest: Rest) -> None:
+        """Keyframes from `since_ns` on are at rest; the biases seen there are those of all."""
+        for keyframe in self.keyframes:
+            keyframe.still |= keyframe.stamp_ns >= since_ns
+            standing = keyframe.state.standing(rest)
+            moving = replace(standing, velocity=keyframe.state.velocity)
+            keyframe.state = standing if keyframe.still else moving
 
     def move(self, scale: float, rotation: NDArray[np.float64], lever: NDArray[np.float64]) -> None:
         """Scale and turn the whole map about its origin, as `RigState.scaled` does a state."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass, replace
 
@@ -15,13 +16,15 @@ from airground.slam.feature_tracker import FeatureTracker
 from airground.slam.frame import Frame
 from airground.slam.geometry.two_view import TwoViewStart, start_from_two_views
 from airground.slam.inertial.preintegration import GRAVITY
-from airground.slam.inertial.stationarity import at_rest, gravity_aligned
+from airground.slam.inertial.stationarity import Rest, at_rest, gravity_aligned
 from airground.slam.motion_model import MotionModel
 from airground.slam.rig_state import RigState
 
 REST_WINDOW_NS = 500_000_000
 REST_FRAMES = 6
 """A slow beginning hides in the noise at first: the map begins this many images earlier."""
+STANDING_M = 0.005
+"""A robot whose camera stays within this [m] for a while stands still, if its IMU says so."""
 START_LEVELS = 3
 MIN_CORNERS = 60
 MIN_LEFT = 0.5
@@ -56,6 +59,31 @@ def _centred(state: RigState, calibration: RobotCalibration) -> RigState:
     return replace(state, position=-state.rotation @ calibration.T_imu_camera.translation)
 
 
+class StandStill:
+    """Notices that a tracked robot stands still, so that its velocity and its biases are known.
+
+    Args:
+        calibration: Of the robot.
+    """
+
+    def __init__(self, calibration: RobotCalibration) -> None:
+        self._noise = calibration.imu
+        self._came_ns = 0
+        self._place = np.full(3, np.inf)
+
+    def observe(self, stamp_ns: int, position: NDArray, motion: MotionModel) -> Rest | None:
+        """What the IMU read, if the robot stood at this place for `REST_WINDOW_NS` by now."""
+        if motion.buffer is None or self._noise is None:
+            return None
+        if math.dist(self._place, position) > STANDING_M:
+            self._came_ns, self._place = stamp_ns, position
+        now = motion.imu_time(stamp_ns)
+        known = motion.buffer.covers(now - REST_WINDOW_NS, now)
+        if stamp_ns - self._came_ns < REST_WINDOW_NS or not known:
+            return None
+        return at_rest(motion.buffer.between(now - REST_WINDOW_NS, now), self._noise)
+
+
 class RestStart:
     """Waits beside a robot at rest until it begins to move.
 
@@ -79,15 +107,10 @@ class RestStart:
             began = self._resting[0] if self._resting else None
             self._resting.clear()
             return began
-        strength = float(np.linalg.norm(rest.specific_force))
         rotation = gravity_aligned(
             rest.specific_force, self._calibration.T_imu_camera.rotation[:, 0]
         )
-        state = replace(
-            RigState.at_origin(rotation),
-            gyro_bias=rest.gyro,
-            accelerometer_bias=rest.specific_force * (1.0 - GRAVITY / strength),
-        )
+        state = RigState.at_origin(rotation).standing(rest)
         self._resting.append((frame, _centred(state, self._calibration)))
         return None
 

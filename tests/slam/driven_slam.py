@@ -64,7 +64,7 @@ class DrivenSlam:
         slam, t = self.slam, self.times[index : index + 1]
         stamp_ns = int(to_ns(t)[0])
         if index == 0:
-            slam.add_imu(self._samples)
+            slam.motion.add(self._samples)
         R = self._motion.rotations(t)[0]
         centre = self.centres(t)[0] + self._rng.normal(0, CENTRE_SIGMA_M, 3)
         R_v_rig = self.R_v_world @ R

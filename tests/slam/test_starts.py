@@ -19,8 +19,10 @@ from airground.slam.rig_state import RigState
 from airground.slam.starts import (
     REST_FRAMES,
     REST_WINDOW_NS,
+    STANDING_M,
     MovingStart,
     RestStart,
+    StandStill,
     TwoViewWait,
     level_start,
 )
@@ -72,6 +74,32 @@ def test_up_is_where_the_accelerometer_says(clock_ns: int) -> None:
     np.testing.assert_allclose(up_of(state), TILT[2], atol=1e-12)
     assert_camera_in_origin(state)
     np.testing.assert_array_equal(state.velocity, np.zeros(3))
+
+
+def test_standing_still_tells_both_biases() -> None:
+    stronger = 1.01 * GRAVITY
+    model = motion_of(TILT.T @ [0, 0, stronger], GYRO_BIAS)
+    standing = StandStill(CALIBRATION)
+    stamps = range(10**9, 10**9 + REST_WINDOW_NS + 1, REST_WINDOW_NS // 5)
+    found = [standing.observe(stamp, np.full(3, 0.1), model) for stamp in stamps]
+    assert all(rest is None for rest in found[:-1])
+    assert found[-1] is not None
+    state = RigState.at_origin(TILT).standing(found[-1])
+    np.testing.assert_allclose(state.gyro_bias, GYRO_BIAS, atol=1e-12)
+    np.testing.assert_allclose(
+        state.rotation @ state.accelerometer_bias, [0, 0, stronger - GRAVITY], atol=1e-9
+    )
+
+
+def test_who_moves_evenly_or_shakes_stands_not() -> None:
+    even = motion_of(TILT.T @ [0, 0, GRAVITY], np.zeros(3))
+    rng = np.random.default_rng(0)
+    shaking = motion_of(TILT.T @ [0, 0, GRAVITY] + rng.normal(0, 0.5, (600, 3)), np.zeros(3))
+    for model, step_m in ((even, 0.3 * STANDING_M), (shaking, 0.0)):
+        standing = StandStill(CALIBRATION)
+        for n in range(40):
+            place = np.array([n * step_m, 0.0, 0.0])
+            assert standing.observe(10**9 + n * REST_WINDOW_NS // 10, place, model) is None
 
 
 @pytest.mark.parametrize("pushed", [[0, 0, 0.7], [0, 0, -1.0], [4.0, 0, 0]])

@@ -35,6 +35,12 @@ class Rest:
     gyro: NDArray[np.float64]
     specific_force: NDArray[np.float64]
 
+    @property
+    def accelerometer_bias(self) -> NDArray[np.float64]:
+        """(3,) what makes it stronger or weaker than gravity; across gravity nobody knows."""
+        strength = float(np.linalg.norm(self.specific_force))
+        return self.specific_force * (1.0 - GRAVITY / strength)
+
 
 def at_rest(samples: ImuSamples, noise: ImuNoise) -> Rest | None:
     """The means of a run of samples if the robot stood still all the while, else None.
