@@ -125,3 +125,17 @@ def test_samples_from_long_ago_are_forgotten_and_the_motion_stays() -> None:
     assert all_of is not None
     np.testing.assert_array_equal(kept.position, all_of.position)
     assert motion.preintegrate(*(int(s) for s in to_ns(np.array([0.1, 0.2]))), state) is None
+
+
+def test_a_measured_pose_brings_its_velocity_unless_inertia_knows_better() -> None:
+    motion, before, there = model(samples()), truth(START_S), truth(END_S)
+    by_inertia = motion.measured(before, predict(motion), there.pose(), 0.1)
+    np.testing.assert_allclose(by_inertia.velocity, there.velocity, atol=1e-3)
+    unmetric = predict(motion, metric=False)
+    by_the_way = motion.measured(before, unmetric, there.pose(), 0.1)
+    np.testing.assert_allclose(by_the_way.velocity, (there.position - before.position) / 0.1)
+    after_a_blind_image = motion.measured(before, unmetric, there.pose(), None)
+    np.testing.assert_array_equal(after_a_blind_image.velocity, np.zeros(3))
+    for state in (by_inertia, by_the_way, after_a_blind_image):
+        np.testing.assert_array_equal(state.position, there.position)
+        np.testing.assert_allclose(state.rotation, there.rotation, atol=1e-12)

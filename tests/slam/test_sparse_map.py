@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,6 +11,8 @@ from hypothesis import strategies as st
 
 from airground.core.se3 import SE3
 from airground.slam import so3
+from airground.slam.inertial.preintegration import GRAVITY
+from airground.slam.inertial.stationarity import Rest
 from airground.slam.rig_state import RigState
 from airground.slam.sparse_map import CANDIDATE, DROPPED, FIRST_POINTS, Keyframe, SparseMap
 from tests.slam.views import CAMERA
@@ -116,6 +120,23 @@ def test_a_keyframe_forgets_and_sees_whole_observations() -> None:
     frame.see(np.array([9]), np.array([[9.0, 0.0]]), np.array([0.5]))
     assert frame.ids.tolist() == frame.pixels[:, 0].tolist() == [4, 6, 9]
     np.testing.assert_array_equal(frame.inverse_depths, [np.nan, np.nan, 0.5])
+
+
+def test_who_stood_has_no_velocity_and_all_have_the_biases_seen_then() -> None:
+    rest = Rest(np.array([0.01, -0.02, 0.03]), np.array([0.0, 0.6, 0.8]) * (GRAVITY + 0.1))
+    sparse_map = some_map()
+    for n, one in enumerate(sparse_map.keyframes):
+        one.stamp_ns = 10 * n
+        one.state = replace(one.state, velocity=np.array([0.3, 0.0, 0.1]))
+    poses = [one.state.pose().matrix() for one in sparse_map.keyframes]
+    sparse_map.stand_still(20, rest)
+    assert [one.still for one in sparse_map.keyframes] == [False, False, True]
+    for one, pose in zip(sparse_map.keyframes, poses, strict=True):
+        speed = [0, 0, 0] if one.still else [0.3, 0.0, 0.1]
+        np.testing.assert_array_equal(one.state.velocity, speed)
+        np.testing.assert_array_equal(one.state.gyro_bias, rest.gyro)
+        np.testing.assert_allclose(one.state.accelerometer_bias, [0, 0.06, 0.08], atol=1e-12)
+        np.testing.assert_array_equal(one.state.pose().matrix(), pose)
 
 
 def culling_map() -> SparseMap:
