@@ -145,10 +145,12 @@ def test_a_keyframe_added_after_a_correction_joins_the_moved_ones() -> None:
 
 def test_small_corrections_are_left_until_they_add_up() -> None:
     ground_map, right = built(path()), path()
-    assert not ground_map.follow(Trajectory.from_poses([0, 1, 2], path(0.001)))
+    limit = GroundMapping().follow_distance_m
+    small, large = path(0.4 * limit), path(0.6 * limit)  # the last of three moves twice as far
+    assert not ground_map.follow(Trajectory.from_poses([0, 1, 2], small))
     assert_same_map(ground_map, built(right))
-    assert ground_map.follow(Trajectory.from_poses([0, 1, 2], path(0.003)))
-    assert_same_map(ground_map, built(path(0.003)))
+    assert ground_map.follow(Trajectory.from_poses([0, 1, 2], large))
+    assert_same_map(ground_map, built(large))
 
 
 def test_keyframes_that_the_trajectory_lacks_stay() -> None:
