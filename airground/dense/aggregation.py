@@ -77,6 +77,7 @@ def _slide_down(
 ) -> None:
     """Image row `enters` joins the running window sums, and row `leaves` goes; -1 is no row."""
     _, planes, width = costs.shape
+    views = np.int32(len(limits))
     for p in range(planes):
         total, count = sums[p, margin : margin + width], counts[p, margin : margin + width]
         if enters >= 0 and leaves >= 0:
@@ -91,25 +92,28 @@ def _slide_down(
             old = costs[leaves, p]
             for x in range(width):
                 total[x] -= np.int32(old[x])
+        # Where one row enters and one leaves, what all views cover stays counted.
+        if enters >= 0 and leaves < 0:
+            count += views
+        elif leaves >= 0 and enters < 0:
+            count -= views
         if enters >= 0:
-            _count_views(limits[:, enters, p], count, 1)
+            _count_uncovered(limits[:, enters, p], count, -1)
         if leaves >= 0:
-            _count_views(limits[:, leaves, p], count, -1)
+            _count_uncovered(limits[:, leaves, p], count, 1)
 
 
 @njit(cache=True, error_model="numpy")
-def _count_views(limits: NDArray, count: NDArray, sign: int) -> None:
-    """Add to `count` (sign 1), or take away (-1), how many views cover each pixel of a row."""
-    signed, views = np.int32(sign), np.int32(sign * len(limits))
-    for x in range(len(count)):
-        count[x] += views
-    # Most views cover most of a row: take away what each does not.
+def _count_uncovered(limits: NDArray, count: NDArray, sign: int) -> None:
+    """Add to `count` (sign 1), or take away (-1), how many views miss each pixel of a row."""
+    signed = np.int32(sign)
+    # Most views cover most of a row.
     for v in range(len(limits)):
         before, after = count[: limits[v, 0]], count[limits[v, 1] :]
         for x in range(len(before)):
-            before[x] -= signed
+            before[x] += signed
         for x in range(len(after)):
-            after[x] -= signed
+            after[x] += signed
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
@@ -117,10 +121,14 @@ def _window_sum(source: NDArray, out: NDArray, radius: int) -> None:
     """out[x] = sum of source[x : x + 2 radius + 1]."""
     width = len(out)
     middle = source[radius : radius + width]
+    if radius == 0:
+        out[:] = middle
+        return
+    left, right = source[radius - 1 :], source[radius + 1 :]
     for x in range(width):
-        out[x] = middle[x]
+        out[x] = left[x] + middle[x] + right[x]
     # Two columns at a time, so that the sums so far are read and written half as often.
-    for i in range(1, radius + 1):
+    for i in range(2, radius + 1):
         left, right = source[radius - i :], source[radius + i :]
         for x in range(width):
             out[x] += left[x] + right[x]

@@ -10,10 +10,12 @@ When SLAM corrects poses, the map follows: keyframes are kept, and fused anew wh
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
-import open3d as o3d
+from numpy.typing import NDArray
 
 from airground.config import GroundMapping
 from airground.core.camera import PinholeCamera
@@ -21,10 +23,12 @@ from airground.core.cloud import PointCloud
 from airground.core.messages import GroundImage
 from airground.core.se3 import SE3, rotation_angle
 from airground.core.trajectory import Trajectory
-from airground.ground_map.blocked_field import BlockedField, empty_grid
+from airground.core.work_ahead import read_ahead
+from airground.ground_map.blocked_field import BLOCK, BlockedField, empty_grid
 from airground.ground_map.integration import integrate
 from airground.ground_map.keyframe import GroundKeyframe
 from airground.ground_map.surface_points import surface_points
+from airground.ground_map.touched_blocks import touched_blocks
 
 _FIRST_BLOCKS = 10_000
 
@@ -40,7 +44,6 @@ class GroundMap:
     def __init__(self, camera: PinholeCamera, config: GroundMapping) -> None:
         self._config = config
         self._camera = camera
-        self._intrinsics = o3d.core.Tensor.from_numpy(camera.matrix())
         self._keyframes: list[GroundKeyframe] = []
         self._grid = empty_grid(self._config.voxel_m, _FIRST_BLOCKS)
         self._fused = 0
@@ -74,7 +77,7 @@ class GroundMap:
         self._keyframes.append(keyframe)
         self._cloud = None
         if self._fused == len(self._keyframes) - 1:
-            self._fuse(keyframe)
+            self._fuse(keyframe, *keyframe.unpack())
 
     def follow(self, trajectory: Trajectory) -> bool:
         """Move the keyframes to where a corrected trajectory has them.
@@ -105,8 +108,7 @@ class GroundMap:
     def cloud(self) -> PointCloud:
         """The surface so far, with normals, in the frame `ground`."""
         if self._cloud is None:
-            for keyframe in self._keyframes[self._fused :]:
-                self._fuse(keyframe)
+            self._catch_up()
             self._cloud = surface_points(self.field(), self._config.min_keyframes - 0.5)
         return self._cloud
 
@@ -114,26 +116,36 @@ class GroundMap:
         """The distance field so far; fusing further keyframes changes it."""
         return BlockedField.of(self._grid, self._config.voxel_m)
 
-    def _fuse(self, keyframe: GroundKeyframe) -> None:
-        """Put a keyframe into the distance field."""
+    def _catch_up(self) -> None:
+        """Fuse what is not in the distance field yet."""
+        waiting = self._keyframes[self._fused :]
+        # Unpacking takes a core for almost as long as fusing does.
+        with (
+            ThreadPoolExecutor(1) as pool,
+            closing(read_ahead(pool, GroundKeyframe.unpack, waiting)) as unpacked,
+        ):
+            for keyframe, images in zip(waiting, unpacked, strict=True):
+                self._fuse(keyframe, *images)
+
+    def _fuse(
+        self, keyframe: GroundKeyframe, depth: NDArray[np.float32], colour: NDArray[np.uint8]
+    ) -> None:
+        """Put a keyframe's images into the distance field."""
         self._fused += 1
-        measured = keyframe.depth()
-        if not measured.any():
-            return  # Open3D refuses an image that touches nothing
         config, pose = self._config, keyframe.T_ground_camera
-        blocks = self._grid.compute_unique_block_coordinates(
-            o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(measured)),
-            self._intrinsics,
-            o3d.core.Tensor.from_numpy(pose.inverse().matrix()),
-            depth_scale=1.0,
-            depth_max=config.max_depth_m,
-            trunc_voxel_multiplier=config.truncation_m / config.voxel_m,
+        blocks = touched_blocks(
+            depth,
+            self._camera,
+            pose,
+            BLOCK * config.voxel_m,
+            config.truncation_m,
+            config.max_depth_m,
         )
         integrate(
             self._grid,
             blocks,
-            measured,
-            keyframe.colour(),
+            depth,
+            colour,
             self._camera,
             pose,
             config.voxel_m,

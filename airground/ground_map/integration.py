@@ -23,7 +23,7 @@ ONE, HALF, SCALE = np.float32(1.0), np.float32(0.5), np.float32(COLOUR_SCALE)
 
 def integrate(
     grid: o3d.t.geometry.VoxelBlockGrid,
-    blocks: o3d.core.Tensor,
+    blocks: NDArray[np.int32],
     depth: NDArray[np.float32],
     colour: NDArray[np.uint8],
     camera: PinholeCamera,
@@ -35,7 +35,7 @@ def integrate(
 
     Args:
         grid: With the attributes that `BlockedField` names; changed.
-        blocks: (N, 3) int32 places of the blocks; those that are missing are made.
+        blocks: (N, 3) places of the blocks; those that are missing are made.
         depth: (height, width) [m], 0 where missing.
         colour: (height, width, 3) RGB.
         camera: Of both images.
@@ -43,12 +43,15 @@ def integrate(
         voxel_m: Side of a voxel [m].
         truncation_m: The field ends this far from the surface [m].
     """
-    grid.hashmap().activate(blocks)
-    rows, _ = grid.hashmap().find(blocks)
+    if len(blocks) == 0:
+        return
+    places = o3d.core.Tensor.from_numpy(blocks)
+    grid.hashmap().activate(places)
+    rows, _ = grid.hashmap().find(places)
     tsdf, weight, colours = (grid.attribute(name).numpy() for name in ATTRIBUTES)
     T_camera_map = T_map_camera.inverse()
     add_view(
-        blocks.numpy(),
+        blocks,
         rows.numpy(),
         depth,
         colour,

@@ -58,6 +58,10 @@ class GroundKeyframe:
             levels.shape,
         )
 
+    def unpack(self) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+        """`depth` and `colour`."""
+        return self.depth(), self.colour()
+
     def depth(self) -> NDArray[np.float32]:
         """(height, width) [m], 0 where missing."""
         levels = np.frombuffer(isal_zlib.decompress(self.packed_depth), np.uint16)

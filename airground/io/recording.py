@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -22,6 +22,7 @@ from airground.core.messages import (
     RobotCalibration,
     Stamped,
 )
+from airground.core.work_ahead import read_ahead
 from airground.errors import RecordingError
 from airground.io import layout
 from airground.io.digests import path_digest
@@ -39,10 +40,11 @@ from airground.io.plausibility import (
     check_up_in_body,
     upwards,
 )
-from airground.io.read_ahead import read_ahead
 from airground.io.tum import read_associations
 
 NOTHING: Mapping[Source, Collection[int]] = MappingProxyType({})
+BOTH = (Source.GROUND, Source.MAV)
+"""In the order of their messages where these are of the same time."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,8 +155,12 @@ class Recording:
         """PNG value of one metre of depth, as the pipeline is told."""
         return self.header.calibration.ground.depth.units_per_m
 
-    def messages(self, dropped: Mapping[Source, Collection[int]] = NOTHING) -> Iterator[Stamped]:
-        """Every message of both robots in order of time.
+    def messages(
+        self,
+        dropped: Mapping[Source, Collection[int]] = NOTHING,
+        robots: Sequence[Source] = BOTH,
+    ) -> Iterator[Stamped]:
+        """Every message in order of time.
 
         Before each image come the inertial and magnetic samples since the previous image
         of the same robot, one message each unless there are none.
@@ -162,6 +168,7 @@ class Recording:
         Args:
             dropped: Stamps [ns] of images to leave out, as if the robot had been too busy for
                 them; their samples come before the next image.
+            robots: Whose messages; of two at the same time those of the first come first.
 
         Raises:
             RecordingError: An image cannot be read or does not fit the calibration.
@@ -171,7 +178,7 @@ class Recording:
                 bundles(
                     robot, self._images(robot, dropped.get(robot, ()), pool), *self.samples(robot)
                 )
-                for robot in (Source.GROUND, Source.MAV)
+                for robot in robots
             )
             for _, bundle in heapq.merge(*streams, key=lambda stamped_bundle: stamped_bundle[0]):
                 yield from bundle

@@ -7,6 +7,7 @@ timed, and what the stages handed each other on the way is kept for one surface.
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -34,12 +35,12 @@ from airground.ground_map import GroundMap
 from airground.ground_map.blocked_field import BlockedField
 from airground.io.recording import Recording
 from airground.pipeline import Pipeline, Sighting, sight
-from evaluation.bench.memory import resident_mib
+from evaluation.process_memory import resident_mib
 from evaluation.protocol.setups import Setup
 from evaluation.realtime.drops import nothing_dropped
 from evaluation.runs.recording import pipeline_rng
 from evaluation.runs.tracking import TrackingTask
-from evaluation.runs.tracking_process import TrackingProcess
+from evaluation.runs.tracking_apart import TrackingApart
 from sim.truth import Truth
 
 PARTS = 10
@@ -111,7 +112,7 @@ class Played:
         recorded_s: How much was played.
         processing_s: By the clock, decoding included.
         cpu_s: Of mapping and tracking.
-        resident_mib: What both processes held after each of ten parts; none if nobody counts it.
+        resident_mib: What all processes held after each of ten parts; none if nobody counts it.
         tracking_memory_mib: The most that tracking ever held.
     """
 
@@ -139,8 +140,8 @@ def play(recording: Recording, config: Config, whole: bool) -> tuple[Material, P
     task = TrackingTask(recording, truth, Setup(config), 0, nothing_dropped(recording))
     pipeline = Pipeline(config, recording.mav, recording.ground, pipeline_rng(0))
     gathering = _Gathering(recording, config, pipeline)
-    with TrackingProcess(task) as tracking:
-        memory = MemoryLog(recording, tracking.pid)
+    with TrackingApart(task) as tracking:
+        memory = MemoryLog(recording, tracking.pids)
         tracking.wait_until_ready()
         started, cpu = time.perf_counter(), time.process_time()
         for event in pipeline.run(tracking.frames()):
@@ -163,8 +164,8 @@ def play(recording: Recording, config: Config, whole: bool) -> tuple[Material, P
 class MemoryLog:
     """Listens to the pipeline, and looks at the memory after each part of the recording."""
 
-    def __init__(self, recording: Recording, tracking: int | str) -> None:
-        self._processes = ("self", tracking)
+    def __init__(self, recording: Recording, tracking: Sequence[int | str]) -> None:
+        self._processes = ("self", *tracking)
         stamps_ns = recording.stamps_ns(Source.GROUND)
         first_ns, last_ns = int(stamps_ns[0]), int(stamps_ns[-1])
         ends_ns = np.linspace(first_ns, last_ns, PARTS + 1)[1:]

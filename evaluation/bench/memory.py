@@ -13,8 +13,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from evaluation.environment import hand_back_memory
+from evaluation.process_memory import held_kib
 
-STATUS = Path("/proc/self/status")
 CLEAR_REFS = Path("/proc/self/clear_refs")
 RESET_HIGH_WATER_MARK = "5"
 
@@ -25,23 +25,8 @@ def peak_memory_mib(call: Callable[[], object]) -> float | None:
     hand_back_memory()
     try:
         CLEAR_REFS.write_text(RESET_HIGH_WATER_MARK, encoding="ascii")
-        before = _kib("VmRSS")
+        before = held_kib("VmRSS")
         call()
-        return max(0, _kib("VmHWM") - before) / 1024
+        return max(0, held_kib("VmHWM") - before) / 1024
     except OSError:  # no Linux, or a container that hides it
         return None
-
-
-def resident_mib(*processes: int | str) -> float | None:
-    """What these processes ("self", or by number) hold now [MiB]; None where nobody counts it."""
-    try:
-        return sum(_kib("VmRSS", Path(f"/proc/{one}/status")) for one in processes) / 1024
-    except OSError:
-        return None
-
-
-def _kib(key: str, status: Path = STATUS) -> int:
-    for line in status.read_text(encoding="ascii").splitlines():
-        if line.startswith(f"{key}:"):
-            return int(line.split()[1])
-    raise OSError(f"{status} has no {key}")

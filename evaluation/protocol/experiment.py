@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ import numpy as np
 
 from airground.io.recording import Recording
 from evaluation.baselines.measure import add_baselines
+from evaluation.process_memory import peak_memory_mib
 from evaluation.protocol.error_budget import add_error_budget
 from evaluation.protocol.mapping_pass import GroundPass, Maps, map_ground, map_recording
 from evaluation.protocol.setups import Setup
@@ -136,11 +136,6 @@ def _measured(recording: Recording, task: Task, stranger: GroundPass | None) -> 
         match = task.baselines and task.protocol.baselines > 0
         showcase = make_showcase(recording, truth, maps, task.setups[0], task.seed, match)
     return Outcome(parts, showcase)
-
-
-def peak_memory_mib() -> float:
-    """The most memory that this process ever held [MiB]."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
 def _add_run(out: RowWriter, recording: Recording, maps: Maps) -> None:

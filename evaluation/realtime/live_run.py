@@ -16,7 +16,7 @@ from airground.link.channel import Receiver
 from airground.tracking import TrackedFrame
 from airground.warm_up import warm_up_mapping
 from evaluation.environment import settle
-from evaluation.protocol.experiment import peak_memory_mib
+from evaluation.process_memory import peak_memory_mib
 from evaluation.protocol.setups import Setup
 from evaluation.realtime.arrivals import in_order
 from evaluation.realtime.clock import PlaybackClock

@@ -19,7 +19,7 @@ from airground.link.channel import Sender
 from airground.slam.warm_up import warm_up_slam
 from airground.tracking import RobotTracker
 from evaluation.environment import prepare, settle
-from evaluation.protocol.experiment import peak_memory_mib
+from evaluation.process_memory import peak_memory_mib
 from evaluation.protocol.setups import Setup
 from evaluation.realtime.clock import PlaybackClock
 from evaluation.realtime.player import Played, play

@@ -10,10 +10,14 @@ from multiprocessing.context import SpawnContext
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from airground.core.cloud import Source
 from airground.core.messages import GroundImage, MavImage
 from airground.core.trajectory import Trajectory
 from airground.slam.front_end import TrackedPose
 from airground.tracking import TrackedFrame
+
+PIXEL_BYTES = {Source.MAV: 1, Source.GROUND: 3 + 4}
+"""Grey; colour and depth."""
 
 
 @dataclass(frozen=True)
@@ -41,11 +45,12 @@ class FrameRing:
     Args:
         context: Of the processes.
         slots: How many.
-        pixels: Of the largest image.
+        robot: Whose frames they are.
+        pixels: Of its images.
     """
 
-    def __init__(self, context: SpawnContext, slots: int, pixels: int) -> None:
-        self._slots, self._slot_bytes = slots, pixels * (3 + 4)
+    def __init__(self, context: SpawnContext, slots: int, robot: Source, pixels: int) -> None:
+        self._slots, self._slot_bytes = slots, pixels * PIXEL_BYTES[robot]
         self._memory = context.RawArray("B", slots * self._slot_bytes)
         self._free = context.Semaphore(slots)
         self._put = 0

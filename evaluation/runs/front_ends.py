@@ -42,11 +42,13 @@ class WatchedFrontEnds:
 
     def tracked(self) -> dict[str, Tracked]:
         """What they said, by robot; to be asked at the end."""
-        watched: dict[str, WatchedFrontEnd] = {"mav": self.mav, "ground": self.ground}
-        return {
-            robot: Tracked(robot, one, one.trajectory(), robot in self.slam)
-            for robot, one in watched.items()
-        }
+        tracked = [self.tracked_by(robot) for robot in (Source.MAV, Source.GROUND)]
+        return {one.robot: one for one in tracked}
+
+    def tracked_by(self, robot: Source) -> Tracked:
+        """What one of them said; to be asked at the end."""
+        one, name = self.of(robot), robot.name.lower()
+        return Tracked(name, one, one.trajectory(), name in self.slam)
 
 
 def front_ends_for(

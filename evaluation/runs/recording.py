@@ -27,7 +27,7 @@ from airground.pipeline import Pipeline, Sighting, sight
 from airground.tracking import TrackedFrame
 from airground.warm_up import warm_up_mapping
 from evaluation.environment import settle
-from evaluation.protocol.experiment import peak_memory_mib
+from evaluation.process_memory import peak_memory_mib
 from evaluation.protocol.setups import Setup
 from evaluation.realtime.drops import DropList, nothing_dropped
 from evaluation.results.row_writer import RowWriter
@@ -35,7 +35,7 @@ from evaluation.results.table import ResultTable
 from evaluation.runs.onlooker import Audience, Onlooker
 from evaluation.runs.timing import STAGE_OF, timed
 from evaluation.runs.tracking import TrackingHere, TrackingTask
-from evaluation.runs.tracking_process import TrackingProcess
+from evaluation.runs.tracking_apart import TrackingApart
 from evaluation.truth.relation import pose_error, squared_mahalanobis
 from evaluation.truth.tracking_quality import Tracked, add_tracking
 from sim.truth import Truth
@@ -79,13 +79,13 @@ def run_recording(
         seed: Of all that is random.
         drops: Which frames to do without, as a live run did.
         onlookers: They see every event; their time counts for no stage, but for the run.
-        apart: Track in a process of its own (`TrackingProcess`), which is faster; the result is
+        apart: Track in processes of their own (`TrackingApart`), which is faster; the result is
             the same.
     """
     drops = drops or nothing_dropped(recording)
     measure = Measure(recording, truth, setup, seed, onlookers)
     task = TrackingTask(recording, truth, setup, seed, drops)
-    with TrackingProcess(task) if apart else nullcontext(TrackingHere(task)) as tracking:
+    with TrackingApart(task) if apart else nullcontext(TrackingHere(task)) as tracking:
         # Compiling is no part of what is timed.
         warm_up_mapping(setup.config, np.random.default_rng(0))
         settle()
@@ -93,7 +93,7 @@ def run_recording(
         started = time.perf_counter()
         measure.run(drops.received(tracking.frames()))
         report = tracking.report()
-        # Tracking in a process of its own ends here; what is taken later is taken alone.
+        # Tracking in processes of its own ends here; what is taken later is taken alone.
         together_mib = peak_memory_mib() + report.peak_memory_mib
         measure.pipeline.mapping.correct_ground(report.ground)
     out = measure.out

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from airground.core.trajectory import Trajectory
-from airground.io.read_ahead import run_ahead
+from airground.core.work_ahead import run_ahead
 from airground.io.recording import Recording
 from airground.slam.warm_up import warm_up_slam
 from airground.tracking import TrackedFrame, Trackers
@@ -19,8 +19,8 @@ from evaluation.runs.front_ends import front_ends_for
 from evaluation.truth.tracking_quality import Tracked
 from sim.truth import Truth
 
-FRAMES_AHEAD = 60
-"""Tracked frames that may wait for mapping: those of a second, of two robots at 30 Hz."""
+FRAMES_AHEAD = 30
+"""Tracked frames of a robot that may wait for mapping: those of a second at 30 Hz."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,8 @@ class TrackingReport:
     Attributes:
         tracked: What the front ends said, by robot ("mav", "ground").
         ground: The ground robot's path as believed at last; None where it has none.
-        processor_s, peak_memory_mib: Of tracking in a process of its own, without the images that
-            it shares with mapping; else 0.
+        processor_s, peak_memory_mib: Of tracking in processes of its own, without what they share
+            with mapping; else 0.
     """
 
     tracked: dict[str, Tracked]
@@ -92,7 +92,7 @@ class TrackingHere:
 
     def frames(self) -> Iterator[TrackedFrame]:
         """As `Tracking.frames`."""
-        yield from run_ahead(self.in_turn(), FRAMES_AHEAD)
+        yield from run_ahead(self.in_turn(), 2 * FRAMES_AHEAD)
 
     def in_turn(self) -> Iterator[TrackedFrame]:
         """Frames as they are asked for, none ahead."""

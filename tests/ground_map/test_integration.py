@@ -89,7 +89,7 @@ def test_open3d_given_half_a_pixel_more_finds_the_same_field() -> None:
         reach = (1.0, 4.0, TRUNCATION_M / VOXEL_M)
         tensor = o3d.core.Tensor.from_numpy
         blocks = ours.compute_unique_block_coordinates(seen, tensor(intrinsics), motion, *reach)
-        integrate(ours, blocks, depth, colour, CAMERA, pose, VOXEL_M, TRUNCATION_M)
+        integrate(ours, blocks.numpy(), depth, colour, CAMERA, pose, VOXEL_M, TRUNCATION_M)
         theirs.integrate(blocks, seen, painted, tensor(shifted), motion, *reach)
     fields = [BlockedField.of(one, VOXEL_M).copy() for one in (ours, theirs)]
     order = [np.lexsort(field.places.T) for field in fields]

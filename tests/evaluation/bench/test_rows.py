@@ -186,7 +186,7 @@ def test_peak_memory_counts_touched_pages_only() -> None:
 
 def test_memory_is_looked_at_after_each_tenth_of_the_recording(material: Material) -> None:
     stamps_ns = material.recording.stamps_ns(Source.GROUND)
-    log = MemoryLog(material.recording, os.getpid())
+    log = MemoryLog(material.recording, [os.getpid()])
     for stamp_ns in stamps_ns:
         log.take(MavTracked(int(stamp_ns), SE3.identity()))
     assert log.resident_mib == []

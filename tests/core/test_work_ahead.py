@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from airground.io.read_ahead import AHEAD, read_ahead, run_ahead
+from airground.core.work_ahead import AHEAD, read_ahead, run_ahead
 
 
 @given(indices=st.lists(st.integers(0, 100), max_size=30), threads=st.integers(1, 3))

@@ -1,4 +1,4 @@
-"""Tracking in another process gives what tracking here gives, and its end is noticed."""
+"""Tracking in other processes gives what tracking here gives, and their end is noticed."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from airground.io.recording import Recording
 from airground.tracking import TrackedFrame
 from evaluation.protocol.setups import Setup
 from evaluation.realtime.drops import Stamps, nothing_dropped
-from evaluation.runs import tracking_process
+from evaluation.runs import robot_tracking_process
 from evaluation.runs.tracking import TrackingHere, TrackingTask
-from evaluation.runs.tracking_process import TrackingProcess
+from evaluation.runs.tracking_apart import TrackingApart
 from sim.truth import Truth
 
 
@@ -48,12 +48,12 @@ def content(frame: TrackedFrame) -> list[object]:
 def test_frames_and_report_are_those_of_tracking_here(
     small: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(tracking_process, "FRAMES_AHEAD", 5)  # slots are used again
+    monkeypatch.setattr(robot_tracking_process, "FRAMES_AHEAD", 5)  # slots are used again
     dropped = (int(Recording.open(small).mav_camera_stamps[4]),)
     here = TrackingHere(task(small, dropped))
     wanted = [content(frame) for frame in here.in_turn()]
     report = here.report()
-    with TrackingProcess(task(small, dropped)) as apart:
+    with TrackingApart(task(small, dropped)) as apart:
         apart.wait_until_ready()
         found = [content(frame) for frame in apart.frames()]
         told = apart.report()
@@ -73,8 +73,8 @@ def test_frames_and_report_are_those_of_tracking_here(
 
 def test_frames_can_be_kept(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nobody writes into an image that was handed over, though its slot is used again."""
-    monkeypatch.setattr(tracking_process, "FRAMES_AHEAD", 2)
-    with TrackingProcess(task(small)) as apart:
+    monkeypatch.setattr(robot_tracking_process, "FRAMES_AHEAD", 2)
+    with TrackingApart(task(small)) as apart:
         apart.wait_until_ready()
         frames = []
         for frame in apart.frames():
@@ -99,7 +99,7 @@ def test_what_cannot_be_read_is_told_as_here(small: Path, tmp_path: Path) -> Non
     sorted((broken / "mav0" / "cam0" / "data").iterdir())[9].write_bytes(b"no picture")
     with pytest.raises(AirgroundError) as here:
         list(TrackingHere(task(broken)).in_turn())
-    with TrackingProcess(task(broken)) as apart:
+    with TrackingApart(task(broken)) as apart:
         apart.wait_until_ready()
         with pytest.raises(AirgroundError) as there:
             list(apart.frames())
@@ -108,14 +108,15 @@ def test_what_cannot_be_read_is_told_as_here(small: Path, tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
-def test_its_death_is_told_and_it_ends_with_the_block(small: Path) -> None:
-    with TrackingProcess(task(small)) as apart:
+@pytest.mark.parametrize("robot", [0, 1])
+def test_a_death_is_told_and_all_end_with_the_block(small: Path, robot: int) -> None:
+    with TrackingApart(task(small)) as apart:
         apart.wait_until_ready()
+        pids = apart.pids
         frames = apart.frames()
         next(frames)
-        os.kill(apart.pid, signal.SIGKILL)
+        os.kill(pids[robot], signal.SIGKILL)
         with pytest.raises(AirgroundError, match="its process died"):
             list(frames)
-    with TrackingProcess(task(small)) as apart:
-        pid = apart.pid
-    assert not Path(f"/proc/{pid}").exists()
+    assert len(pids) == 2
+    assert not any(Path(f"/proc/{pid}").exists() for pid in pids)

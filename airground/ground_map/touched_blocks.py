@@ -1,0 +1,129 @@
+"""Which blocks of a distance field a depth image says something of (Sec. IV).
+
+What Open3D calls `compute_unique_block_coordinates`, and the same blocks; it gathers them in a
+hash set, where a box of marks around the view is enough.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from airground.core.camera import PinholeCamera
+from airground.core.se3 import SE3
+
+STRIDE = 4
+"""Every so many pixels along both axes are looked at [px]."""
+STEPS = 3
+"""Steps along a ray from the near to the far end of the truncated field."""
+
+
+def touched_blocks(
+    depth: NDArray[np.float32],
+    camera: PinholeCamera,
+    T_map_camera: SE3,
+    block_m: float,
+    truncation_m: float,
+    max_depth_m: float,
+) -> NDArray[np.int32]:
+    """Blocks that a truncated signed distance field needs for a view.
+
+    Args:
+        depth: (height, width) [m], 0 where missing.
+        camera: Of the image.
+        T_map_camera: Where it was taken.
+        block_m: Side of a block [m].
+        truncation_m: The field ends this far from the surface [m].
+        max_depth_m: Depth from here on is not used [m].
+
+    Returns:
+        (N, 3) x, y, z of each block in the frame `map` [blocks], each once, by x, then y, then z.
+    """
+    inverse = np.array([1 / camera.fx, 1 / camera.fy, camera.cx, camera.cy], np.float32)
+    blocks, count = blocks_along_rays(
+        depth,
+        inverse,
+        T_map_camera.matrix()[:3].astype(np.float32),
+        np.float32(block_m),
+        np.float32(truncation_m),
+        np.float32(max_depth_m),
+    )
+    return unique_blocks(blocks[:count])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def blocks_along_rays(
+    depth: NDArray[np.float32],
+    inverse: NDArray[np.float32],
+    T_map_camera: NDArray[np.float32],
+    block_m: np.float32,
+    truncation_m: np.float32,
+    max_depth_m: np.float32,
+) -> tuple[NDArray[np.int32], int]:
+    """The blocks of points on both sides of what each pixel measured, one after another.
+
+    Args:
+        depth: As in `touched_blocks`.
+        inverse: 1 / fx, 1 / fy, cx, cy.
+        T_map_camera: (3, 4).
+        block_m, truncation_m, max_depth_m: As in `touched_blocks`.
+
+    Returns:
+        Room for blocks (M, 3), and how many there are.
+    """
+    rows, columns = depth.shape[0] // STRIDE, depth.shape[1] // STRIDE
+    blocks = np.empty((rows * columns * (STEPS + 1), 3), np.int32)
+    r00, r01, r02, x0 = T_map_camera[0]
+    r10, r11, r12, y0 = T_map_camera[1]
+    r20, r21, r22, z0 = T_map_camera[2]
+    nothing = np.float32(0.0)
+    count = 0
+    for v in range(0, rows * STRIDE, STRIDE):
+        down = (np.float32(v) - inverse[3]) * inverse[1]
+        for u in range(0, columns * STRIDE, STRIDE):
+            measured = depth[v, u]
+            if not (measured > 0 and measured < max_depth_m):
+                continue
+            right = (np.float32(u) - inverse[2]) * inverse[0]
+            along_x = r00 * right + r01 * down + r02
+            along_y = r10 * right + r11 * down + r12
+            along_z = r20 * right + r21 * down + r22
+            near = max(measured - truncation_m, nothing)
+            far = min(measured + truncation_m, max_depth_m)
+            step = (far - near) / np.float32(STEPS)
+            at = near
+            for _ in range(STEPS + 1):
+                blocks[count, 0] = np.floor((x0 + at * along_x) / block_m)
+                blocks[count, 1] = np.floor((y0 + at * along_y) / block_m)
+                blocks[count, 2] = np.floor((z0 + at * along_z) / block_m)
+                count += 1
+                at += step
+    return blocks, count
+
+
+@njit(cache=True, nogil=True)
+def unique_blocks(blocks: NDArray[np.int32]) -> NDArray[np.int32]:
+    """(N, 3) of (M, 3): each once, sorted, as `np.unique` along the first axis."""
+    if len(blocks) == 0:
+        return np.empty((0, 3), np.int32)
+    low, high = blocks[0].copy(), blocks[0].copy()
+    for block in blocks:
+        for axis in range(3):
+            low[axis] = min(low[axis], block[axis])
+            high[axis] = max(high[axis], block[axis])
+    sides = high - low + 1
+    marks = np.zeros((sides[0], sides[1], sides[2]), np.bool_)
+    for block in blocks:
+        marks[block[0] - low[0], block[1] - low[1], block[2] - low[2]] = True
+    unique = np.empty((np.count_nonzero(marks), 3), np.int32)
+    count = 0
+    for x in range(sides[0]):
+        for y in range(sides[1]):
+            for z in range(sides[2]):
+                if marks[x, y, z]:
+                    unique[count, 0] = low[0] + x
+                    unique[count, 1] = low[1] + y
+                    unique[count, 2] = low[2] + z
+                    count += 1
+    return unique
