@@ -108,7 +108,8 @@ class Played:
     """How long the whole pipeline took over the recording.
 
     Attributes:
-        frame_ms: By robot ("mav", "ground"): each image with the inertial samples before it.
+        frame_ms: By robot ("mav", "ground"): processor time of each image, with the inertial
+            samples before it.
         recorded_s: How much was played.
         processing_s: By the clock, decoding included.
         cpu_s: Of mapping and tracking.

@@ -43,20 +43,20 @@ class Timing(Part):
     def of(cls, turns: list[Turn]) -> Self:
         """Of calls that were measured in full."""
         samples = list(chain.from_iterable(turns))
-        timing = cls.of_wall([sample.wall_ms for sample in samples])
+        timing = cls.of_times([sample.wall_ms for sample in samples])
         cpu = float(np.median([sample.cpu_ms for sample in samples]))
         return timing.model_copy(update={"cpu_median_ms": cpu})
 
     @classmethod
-    def of_wall(cls, wall_ms: list[float]) -> Self:
-        """Of times by the clock alone."""
-        median, p95 = np.percentile(wall_ms, [50, 95])
+    def of_times(cls, times_ms: list[float]) -> Self:
+        """Of times by one clock alone."""
+        median, p95 = np.percentile(times_ms, [50, 95])
         return cls(
-            n=len(wall_ms),
-            mean_ms=float(np.mean(wall_ms)),
+            n=len(times_ms),
+            mean_ms=float(np.mean(times_ms)),
             median_ms=float(median),
             p95_ms=float(p95),
-            least_ms=min(wall_ms),
+            least_ms=min(times_ms),
         )
 
 

@@ -167,14 +167,14 @@ def played_row(name: str, played: dict[int, Played]) -> RowResult:
     """A row that was timed image by image while the recording was played."""
     stage, robot, target_ms = PLAYED[name]
     lanes = [
-        LaneTiming(threads=count, timing=Timing.of_wall(one.frame_ms[robot]))
+        LaneTiming(threads=count, timing=Timing.of_times(one.frame_ms[robot]))
         for count, one in sorted(played.items())
     ]
     return RowResult(
         name=name,
         title=stage.title,
         group=stage.group,
-        size=f"{lanes[0].timing.n} images, mapping included",
+        size=f"{lanes[0].timing.n} images, mapping included, processor time",
         published_ms=stage.published_ms,
         published_on=stage.processor,
         target_ms=target_ms,

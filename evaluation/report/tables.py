@@ -61,6 +61,15 @@ def success_at(table: ResultTable, iteration: int, limit: float) -> Rate:
     return rate_within(errors[iteration], limit)
 
 
+def posed_at(table: ResultTable, iteration: int, limit_m: float, limit_deg: float) -> Rate:
+    """How many sequences are within both limits at an iteration; none where nobody looked."""
+    off_m, off_deg = table.sequences("error_m"), table.sequences("error_deg")
+    if len(table.values("localization", "error_deg")) == 0 or iteration not in off_deg:
+        return wilson(0, 0)
+    within = (off_m[iteration] <= limit_m) & (off_deg[iteration] <= limit_deg)
+    return wilson(int(within.sum()), len(within))
+
+
 def claims(table: ResultTable, wrong_beyond_m: float = 0.5) -> tuple[Rate, Rate]:
     """At the last iteration: sequences that claim a position, and those claims that are wrong."""
     errors, converged = table.sequences("error_m"), table.sequences("converged")
@@ -226,6 +235,7 @@ _COMPARED_ROWS: tuple[tuple[str, str, Callable[[ResultTable], str]], ...] = (
     ("sequences", "41", lambda t: _count(len(t.sequences("error_m")))),
     ("within 0.5 m at iteration 1", "65 %", lambda t: rate(success_at(t, 1, 0.5))),
     ("within 0.25 m after 4", "89 %", lambda t: rate(success_at(t, 4, 0.25))),
+    ("within 0.25 m and 3° after 4", MISSING, lambda t: rate(posed_at(t, 4, 0.25, 3.0))),
     ("median error after 4", MISSING, lambda t: _error_after(t, 4)),
     ("median error after 12", MISSING, lambda t: _error_after(t, 12)),
     ("claims a position at the end", MISSING, _claimed),

@@ -64,6 +64,7 @@ class RowWriter:
         """What a filter says after one aerial map, and how far off it is (Fig. 11, 12)."""
         for metric, value, unit in (
             ("error_m", error.horizontal_m, "m"),
+            ("error_deg", error.rotation_deg, "deg"),
             ("spread_m", belief.spread_m, "m"),
             ("squared_mahalanobis", squared_mahalanobis, ""),
             ("converged", belief.converged, ""),
@@ -81,12 +82,17 @@ class RowWriter:
 
     def add_no_belief(self, reason: str, sequence: int, iteration: int) -> None:
         """An aerial map that never came: counts as failed."""
-        for metric, value in (("error_m", float("nan")), ("converged", 0.0)):
+        nothing = float("nan")
+        for metric, value, unit in (
+            ("error_m", nothing, "m"),
+            ("error_deg", nothing, "deg"),
+            ("converged", 0.0, ""),
+        ):
             self.add(
                 "localization",
                 metric,
                 value,
-                "",
+                unit,
                 sequence=sequence,
                 iteration=iteration,
                 note=reason,

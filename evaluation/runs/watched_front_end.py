@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
@@ -45,24 +46,28 @@ class WatchedFrontEnd(FrontEndLog, Generic[Image]):
 
     Args:
         inner: Who really tracks.
+        clock: Tells the time [s].
     """
 
-    def __init__(self, inner: FrontEnd[Image]) -> None:
+    def __init__(
+        self, inner: FrontEnd[Image], clock: Callable[[], float] = time.perf_counter
+    ) -> None:
         super().__init__()
         self._inner: FrontEnd[Image] = inner
+        self._clock = clock
         self._imu_s = 0.0
 
     def add_imu(self, samples: ImuSamples) -> None:
         """Pass inertial measurements on."""
-        started = time.perf_counter()
+        started = self._clock()
         self._inner.add_imu(samples)
-        self._imu_s += time.perf_counter() - started
+        self._imu_s += self._clock() - started
 
     def track(self, image: Image) -> TrackedPose:
         """Pass an image on."""
-        started = time.perf_counter()
+        started = self._clock()
         answer = self._inner.track(image)
-        self.durations_ms.append(1e3 * (time.perf_counter() - started + self._imu_s))
+        self.durations_ms.append(1e3 * (self._clock() - started + self._imu_s))
         self._imu_s = 0.0
         self.answers.append(answer)
         return answer

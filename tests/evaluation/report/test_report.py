@@ -18,6 +18,7 @@ from evaluation.report.tables import (
     comparison_table,
     degrees,
     metres,
+    posed_at,
     scene_table,
     timing_table,
 )
@@ -127,6 +128,19 @@ def test_drift_is_shown_where_it_was_measured() -> None:
     rows = [Row("indoor_a", 1, 0, DRIFT, "trajectory", "mav_ate_se3_rmse_m", 0.0123, "m")]
     made = comparison_table(ResultTable.from_rows(rows), [DRIFT])
     assert ("MAV poses, live, RMS after SE3", "12 mm", "12.3 mm") in made.rows
+
+
+def test_a_place_with_the_wrong_heading_is_not_a_pose() -> None:
+    off = [(0.1, 2.9), (0.1, 3.1), (0.3, 1.0), (np.nan, np.nan)]
+    rows = [
+        Row("indoor_a", 1, 0, BEST, "localization", metric, value, unit, n, iteration=4)
+        for n, errors in enumerate(off)
+        for metric, value, unit in zip(("error_m", "error_deg"), errors, ("m", "deg"), strict=True)
+    ]
+    made = posed_at(ResultTable.from_rows(rows), 4, 0.25, 3.0)
+    assert (made.successes, made.total) == (1, 4)
+    without = [row for row in rows if row.metric != "error_deg"]
+    assert posed_at(ResultTable.from_rows(without), 4, 0.25, 3.0).total == 0
 
 
 def test_every_failure_is_listed_with_its_reason(table: ResultTable) -> None:

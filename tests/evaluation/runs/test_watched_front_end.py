@@ -36,3 +36,12 @@ def test_corners_are_passed_on_and_not_kept() -> None:
     (kept,) = watched.log().answers
     assert kept.corners is None
     assert (kept.stamp_ns, kept.tracking) == (said.stamp_ns, said.tracking)
+
+
+def test_an_image_takes_as_long_as_its_clock_says_inertial_samples_included() -> None:
+    ticks = iter([1.0, 1.25, 2.0, 2.5, 7.0, 8.0])
+    watched: WatchedFrontEnd[MavImage] = WatchedFrontEnd(Standing(), lambda: next(ticks))
+    watched.add_imu(ImuSamples(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3))))
+    for stamp in (5, 6):
+        watched.track(MavImage(stamp, np.zeros((4, 4), np.uint8)))
+    assert watched.log().durations_ms == [750.0, 1000.0]
