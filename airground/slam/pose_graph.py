@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import open3d as o3d
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
@@ -71,6 +70,9 @@ def optimize(poses: Sequence[SE3], edges: Sequence[Edge]) -> list[SE3]:
         poses: `T_map_rig` of the keyframes, first guess; the first is held.
         edges: Relative poses; all keyframes must hang together by them.
     """
+    # 160 MiB in a process that only tracks, where most recordings close no loop.
+    import open3d as o3d
+
     registration = o3d.pipelines.registration
     graph = registration.PoseGraph()
     for pose in poses:

@@ -121,7 +121,8 @@ class OwnWords:
 
     def _given(self) -> Given:
         from airground.io.tum import read_tum
-        from evaluation.runs.given import Given, read_map
+        from evaluation.runs.given import Given
+        from evaluation.runs.given_map import read_map
 
         return Given(
             mav=read_tum(self.mav_trajectory) if self.mav_trajectory else None,

@@ -16,7 +16,7 @@ from evaluation.environment import usable_cores
 if TYPE_CHECKING:
     from airground.config import Config
     from evaluation.protocol.setups import Setup
-    from evaluation.truth.oracle import PoseNoise
+    from evaluation.truth.pose_noise import PoseNoise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,7 +126,7 @@ class PoseWords:
         Raises:
             InputError: A number is out of range, or there is no oracle to add it to.
         """
-        from evaluation.truth.oracle import EXACT, PoseNoise
+        from evaluation.truth.pose_noise import EXACT, PoseNoise
 
         noise = PoseNoise(
             drift_mav_m=in_range("--drift-mav-cm", self.drift_mav_cm, high=100) / 100,

@@ -26,7 +26,7 @@ from evaluation.environment import settle
 from evaluation.protocol.setups import Setup
 from evaluation.runs.front_ends import front_ends_for
 from evaluation.runs.timing import STAGE_OF, timed
-from evaluation.truth.tracking_quality import Tracked
+from evaluation.runs.tracked import Tracked
 from sim.truth import Truth
 
 

@@ -6,12 +6,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 from airground.config import Config, paper
-from evaluation.results.table import Condition
+from evaluation.results.condition import Condition
 from evaluation.runs.given import NOTHING, Given
-from evaluation.truth.oracle import EXACT, PoseNoise
+from evaluation.truth.pose_noise import EXACT, PoseNoise
 
 Poses = Literal["slam", "oracle", "slam, exact mav", "slam, exact ground"]
 """Where poses come from: each robot's own SLAM, or the truth for both or one of them."""
+
+FrontEndName = Literal["slam", "oracle", "file"]
+"""Who tracks a robot: its own SLAM, the truth, or a trajectory that the user brought along."""
 
 ROBOTS = {"mav", "ground"}
 
@@ -34,10 +37,20 @@ class Setup:
     variant: str = ""
     given: Given = NOTHING
 
+    def front_ends(self) -> dict[str, FrontEndName]:
+        """Who tracks "mav" and "ground"."""
+        oracles = {"oracle": ROBOTS, "slam, exact mav": {"mav"}, "slam, exact ground": {"ground"}}
+        way: dict[str, FrontEndName] = dict.fromkeys(ROBOTS, "slam")
+        way |= dict.fromkeys(oracles.get(self.poses, set()), "oracle")
+        return way | dict.fromkeys(self.given.robots(), "file")
+
     def slam_robots(self) -> frozenset[str]:
         """Those of "mav" and "ground" whose poses come from SLAM."""
-        without = {"oracle": ROBOTS, "slam, exact mav": {"mav"}, "slam, exact ground": {"ground"}}
-        return frozenset(ROBOTS - without.get(self.poses, set()) - self.given.robots())
+        return frozenset(robot for robot, way in self.front_ends().items() if way == "slam")
+
+    def needs_truth(self) -> bool:
+        """Whether any robot's poses come from an oracle."""
+        return "oracle" in self.front_ends().values()
 
     def condition(self, sensors: str) -> Condition:
         """How results name this setup."""

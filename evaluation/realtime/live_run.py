@@ -27,8 +27,8 @@ from evaluation.realtime.robot_process import RobotProcess
 from evaluation.realtime.tracker_process import TrackerTask
 from evaluation.runs.recording import Measure, RunResult
 from evaluation.runs.timing import timed
+from evaluation.runs.tracked import Tracked
 from evaluation.runs.watched_front_end import FrontEndLog
-from evaluation.truth.tracking_quality import Tracked
 from sim.truth import Truth
 
 START_NS = 300_000_000

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import multiprocessing
 import os
 import threading
@@ -25,10 +26,9 @@ from evaluation.realtime.clock import PlaybackClock
 from evaluation.realtime.player import Played, play
 from evaluation.realtime.radio import Radio, RadioLimits
 from evaluation.realtime.uplink import Uplink
-from evaluation.runs.front_ends import front_ends_for
+from evaluation.runs.front_ends import front_ends_for, truth_for
 from evaluation.runs.tracking import front_end_rng
 from evaluation.runs.watched_front_end import FrontEndLog
-from sim.truth import Truth
 
 
 @dataclass(frozen=True)
@@ -94,11 +94,13 @@ def live(task: TrackerTask, pipe: Connection) -> None:
 
 def _report(task: TrackerTask, pipe: Connection) -> TrackerReport:
     recording = Recording.open(task.recording)
-    truth = Truth.open(task.recording)
+    truth = truth_for(task.setup, task.recording)
     watched = front_ends_for(task.setup, recording, truth, front_end_rng(task.seed))
     tracker = RobotTracker(task.robot, recording.calibration(task.robot), watched.of(task.robot))
     if task.robot.name.lower() in task.setup.slam_robots():
         warm_up_slam(np.random.default_rng(0))
+        # SLAM loads it when a loop closes; here nobody can wait for that.
+        importlib.import_module("open3d")
     settle()
     radio = None
     if task.radio is not None:

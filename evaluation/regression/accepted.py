@@ -20,7 +20,7 @@ from evaluation.checked_json import read_checked
 from evaluation.regression.measured import Measured, headline
 from evaluation.regression.metrics import WATCHED
 from evaluation.regression.samples import DIGITS, Flight, Samples
-from evaluation.results.table import Condition
+from evaluation.results.condition import Condition
 
 SCHEMA: Literal[1] = 1
 Text = Annotated[str, Field(min_length=1)]

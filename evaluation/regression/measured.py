@@ -10,7 +10,8 @@ import numpy as np
 from airground.errors import InputError
 from evaluation.regression.metrics import WATCHED, Metric
 from evaluation.regression.samples import Flight, Samples, flights
-from evaluation.results.table import Condition, ResultTable
+from evaluation.results.condition import Condition
+from evaluation.results.table import ResultTable
 from evaluation.statistics.comparison import median
 
 

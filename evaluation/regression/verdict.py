@@ -20,7 +20,7 @@ from airground.errors import InputError
 from evaluation.regression.measured import Measured, figure, flight_value
 from evaluation.regression.metrics import WATCHED, Metric
 from evaluation.regression.samples import Samples
-from evaluation.results.table import Condition
+from evaluation.results.condition import Condition
 from evaluation.statistics.comparison import (
     Effect,
     adjusted,

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from evaluation.figures.error_budget import error_budget_figure
 from evaluation.report.tables import TextTable, degrees, metres, rate
-from evaluation.results.table import Condition, ResultTable
+from evaluation.results.condition import Condition
+from evaluation.results.table import ResultTable
 from evaluation.showcase.figures import ReportFigure
 from evaluation.statistics.intervals import quantile, wilson
 

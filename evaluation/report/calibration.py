@@ -8,7 +8,8 @@ import numpy as np
 
 from evaluation.figures.calibration import calibration_figure
 from evaluation.report.tables import MISSING, TextTable, rate
-from evaluation.results.table import Condition, ResultTable
+from evaluation.results.condition import Condition
+from evaluation.results.table import ResultTable
 from evaluation.showcase.figures import ReportFigure
 from evaluation.trust.calibration import ELLIPSES, Localizations, localizations
 from evaluation.trust.cases import NO_OVERLAP, WRONG_MAP

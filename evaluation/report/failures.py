@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from evaluation.report.tables import MISSING, TextTable, degrees, metres
-from evaluation.results.table import SEQUENCE_KEYS, Condition, ResultTable
+from evaluation.results.condition import Condition
+from evaluation.results.table import SEQUENCE_KEYS, ResultTable
 
 JUDGED_AFTER, LOCATED_M = 4, 0.25
 """A sequence farther off than this after so many aerial maps failed."""

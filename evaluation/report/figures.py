@@ -20,7 +20,8 @@ from evaluation.report import published
 from evaluation.report.budget import budget_figure
 from evaluation.report.calibration import calibration_figures
 from evaluation.report.trajectories import trajectory_figures
-from evaluation.results.table import Condition, ResultTable, shared_parts, short_labels
+from evaluation.results.condition import Condition, shared_parts, short_labels
+from evaluation.results.table import ResultTable
 from evaluation.showcase.figures import ReportFigure, showcase_figures
 from evaluation.showcase.showcase import Showcase
 

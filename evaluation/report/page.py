@@ -16,8 +16,9 @@ from evaluation.report.html import rendered, saved_picture
 from evaluation.report.live import live_table
 from evaluation.report.tables import comparison_table, scene_table, timing_table
 from evaluation.report.trajectories import trajectory_table
+from evaluation.results.condition import Condition, shared_parts
 from evaluation.results.run_info import RunInfo
-from evaluation.results.table import Condition, ResultTable, shared_parts
+from evaluation.results.table import ResultTable
 from evaluation.showcase.showcase import Showcase
 
 

@@ -10,8 +10,9 @@ import pandas as pd
 
 from evaluation.realtime.live_summary import STAGE, live_summary
 from evaluation.report import published
+from evaluation.results.condition import Condition, short_labels
 from evaluation.results.summary import real_time_factor, within_5cm_2deg
-from evaluation.results.table import Condition, ResultTable, short_labels
+from evaluation.results.table import ResultTable
 from evaluation.statistics.intervals import Rate, quantile, quantiles, rate_within, wilson
 
 MISSING = "-"

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from evaluation.figures.fig09_10_trajectory_error import ErrorOverTime, trajectory_error_figure
 from evaluation.report import published
 from evaluation.report.tables import MISSING, TextTable, metres
-from evaluation.results.table import Condition, ResultTable, short_labels
+from evaluation.results.condition import Condition, short_labels
+from evaluation.results.table import ResultTable
 from evaluation.showcase.figures import ReportFigure
 from evaluation.statistics.intervals import quantile, with_failures
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from airground.core.belief import Alignment, Belief
-from evaluation.results.table import Condition, Row
+from evaluation.results.condition import Condition
+from evaluation.results.table import Row
 from evaluation.truth.relation import PoseError
 
 

@@ -20,9 +20,10 @@ from airground.errors import InputError
 from evaluation.checked_json import read_checked
 from evaluation.realtime.live_summary import LiveSummary, live_summary
 from evaluation.report.published import TABLE_I
+from evaluation.results.condition import Condition
 from evaluation.results.run_info import RunInfo
 from evaluation.results.summary_parts import Count, Number, Part, Share, number
-from evaluation.results.table import Condition, ResultTable
+from evaluation.results.table import ResultTable
 from evaluation.statistics.intervals import quantile, quantiles, rate_within, wilson, with_failures
 from evaluation.trust.summary import (
     CalibrationSummary,

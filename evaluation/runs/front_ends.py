@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,10 +15,11 @@ from airground.io.recording import Recording
 from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
 from airground.tracking import FrontEnds
 from evaluation.protocol.setups import Setup
+from evaluation.runs.tracked import Tracked
 from evaluation.runs.watched_front_end import WatchedFrontEnd
-from evaluation.truth.oracle import oracle_front_ends
-from evaluation.truth.tracking_quality import Tracked
-from sim.truth import Truth
+
+if TYPE_CHECKING:
+    from sim.truth import Truth
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,32 +55,57 @@ class WatchedFrontEnds:
 
 
 def front_ends_for(
-    setup: Setup, recording: Recording, truth: Truth, rng: np.random.Generator
+    setup: Setup, recording: Recording, truth: Truth | None, rng: np.random.Generator
 ) -> WatchedFrontEnds:
     """The front ends of a setup: SLAM, an oracle, or a file, for each robot.
 
     Args:
         setup: Says which.
         recording: Its calibrations and stamps are used, as they are told.
-        truth: For the oracles only.
+        truth: For oracles; None where the setup has none.
         rng: Draws the oracles' errors and SLAM's samples.
     """
-    oracles = oracle_front_ends(recording, truth, setup.noise, rng)
-    mav, ground = oracles.mav, oracles.ground
-    slam, (mav_rng, ground_rng) = setup.slam_robots(), rng.spawn(2)
-    if "mav" in slam:
-        mav = make_front_end(MAV, "slam", Ingredients(recording.mav, setup.config, mav_rng))
-    if "ground" in slam:
-        ground = make_front_end(
-            GROUND, "slam", Ingredients(recording.ground, setup.config, ground_rng)
-        )
-    given = setup.given
-    if given.mav is not None:
-        brought = Ingredients(recording.mav, setup.config, mav_rng, given.mav)
-        mav = make_front_end(MAV, "file", brought)
-    if given.ground is not None:
-        brought = Ingredients(recording.ground, setup.config, ground_rng, given.ground)
-        ground = make_front_end(GROUND, "file", brought)
+    way, given = setup.front_ends(), setup.given
+    oracles = _oracles(setup, recording, truth, rng)
+    mav_rng, ground_rng = rng.spawn(2)
+    if oracles and way["mav"] == "oracle":
+        mav = oracles.mav
+    else:
+        needs = Ingredients(recording.mav, setup.config, mav_rng, given.mav)
+        mav = make_front_end(MAV, way["mav"], needs)
+    if oracles and way["ground"] == "oracle":
+        ground = oracles.ground
+    else:
+        needs = Ingredients(recording.ground, setup.config, ground_rng, given.ground)
+        ground = make_front_end(GROUND, way["ground"], needs)
     # They track in one thread, which waits where another process has more right to the core.
     clock = time.thread_time
-    return WatchedFrontEnds(WatchedFrontEnd(mav, clock), WatchedFrontEnd(ground, clock), slam)
+    watched = WatchedFrontEnd(mav, clock), WatchedFrontEnd(ground, clock)
+    return WatchedFrontEnds(*watched, setup.slam_robots())
+
+
+def truth_for(setup: Setup, recording: Path) -> Truth | None:
+    """The truth that oracles need; None where the setup has none.
+
+    Raises:
+        AirgroundError: It is not there or damaged.
+    """
+    if not setup.needs_truth():
+        return None
+    from sim.truth import Truth
+
+    return Truth.open(recording)
+
+
+def _oracles(
+    setup: Setup, recording: Recording, truth: Truth | None, rng: np.random.Generator
+) -> FrontEnds | None:
+    """Of both robots, where any is needed."""
+    if not setup.needs_truth():
+        rng.spawn(2)  # as oracles would: whoever draws next draws the same
+        return None
+    # Open3D and MuJoCo come along: who only tracks does without them and their 200 MiB.
+    from evaluation.truth.oracle import oracle_front_ends
+
+    assert truth is not None
+    return oracle_front_ends(recording, truth, setup.noise, rng)

@@ -27,13 +27,14 @@ from airground.tracking import FrontEnds, Trackers
 from airground.warm_up import warm_up
 from evaluation.protocol.setups import Setup
 from evaluation.runs.alone import error_against, of_pose_frame
+from evaluation.runs.given_map import enter
 from evaluation.runs.onlooker import Audience, Onlooker
 from evaluation.runs.recording import pipeline_rng
 from evaluation.runs.timing import timed
+from evaluation.runs.tracked import Tracked
 from evaluation.runs.tracking import front_end_rng
 from evaluation.runs.watched_front_end import WatchedFrontEnd
 from evaluation.truth.camera import true_camera
-from evaluation.truth.tracking_quality import Tracked
 
 ROBOTS = {Source.MAV: "mav", Source.GROUND: "ground"}
 
@@ -85,7 +86,7 @@ def run_pair(pair: Pair, setup: Setup, seed: int, onlookers: Sequence[Onlooker] 
     pipeline = Pipeline(
         setup.config, pair.mav.calibration, pair.ground.calibration, pipeline_rng(seed)
     )
-    setup.given.enter(pipeline)
+    enter(setup.given, pipeline)
     audience, sighting = Audience(onlookers), None
     if audience:  # who is shown times, without those of compiling
         warm_up(setup.config, np.random.default_rng(0))

@@ -32,12 +32,14 @@ from evaluation.protocol.setups import Setup
 from evaluation.realtime.drops import DropList, nothing_dropped
 from evaluation.results.row_writer import RowWriter
 from evaluation.results.table import ResultTable
+from evaluation.runs.given_map import enter
 from evaluation.runs.onlooker import Audience, Onlooker
 from evaluation.runs.timing import STAGE_OF, timed
+from evaluation.runs.tracked import Tracked
 from evaluation.runs.tracking import TrackingHere, TrackingTask
 from evaluation.runs.tracking_apart import TrackingApart
 from evaluation.truth.relation import pose_error, squared_mahalanobis
-from evaluation.truth.tracking_quality import Tracked, add_tracking
+from evaluation.truth.tracking_quality import add_tracking
 from sim.truth import Truth
 
 
@@ -162,7 +164,7 @@ class Measure:
             recording.ground,
             pipeline_rng(seed),
         )
-        setup.given.enter(self.pipeline)
+        enter(setup.given, self.pipeline)
         condition = setup.condition(recording.sensors)
         self.out = RowWriter(recording.scene, recording.seed, recording.flight, condition)
         self._truth = truth

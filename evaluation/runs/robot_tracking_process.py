@@ -24,11 +24,10 @@ from evaluation.process_memory import files_mib, peak_memory_mib
 from evaluation.protocol.setups import Setup
 from evaluation.realtime.drops import DropList
 from evaluation.runs.frame_ring import FrameRing, Handed
-from evaluation.runs.front_ends import front_ends_for
+from evaluation.runs.front_ends import front_ends_for, truth_for
+from evaluation.runs.tracked import Tracked
 from evaluation.runs.tracking import FRAMES_AHEAD, TrackingTask, front_end_rng
-from evaluation.truth.tracking_quality import Tracked
 from sim.interrupts import deaf_children, end_with_parent
-from sim.truth import Truth
 
 NICENESS = 10
 """Where both have work, mapping goes first: it takes longer, and tracking fills the gaps."""
@@ -133,7 +132,8 @@ def _track(order: _Order, ring: FrameRing, pipe: Connection) -> None:
     os.nice(NICENESS)
     prepare(1)
     try:
-        recording, truth = Recording.open(order.recording), Truth.open(order.recording)
+        recording = Recording.open(order.recording)
+        truth = truth_for(order.setup, order.recording)
         watched = front_ends_for(order.setup, recording, truth, front_end_rng(order.seed))
         calibration = recording.calibration(order.robot)
         tracker = RobotTracker(order.robot, calibration, watched.of(order.robot))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -16,8 +16,10 @@ from airground.tracking import TrackedFrame, Trackers
 from evaluation.protocol.setups import Setup
 from evaluation.realtime.drops import DropList
 from evaluation.runs.front_ends import front_ends_for
-from evaluation.truth.tracking_quality import Tracked
-from sim.truth import Truth
+from evaluation.runs.tracked import Tracked
+
+if TYPE_CHECKING:
+    from sim.truth import Truth
 
 FRAMES_AHEAD = 30
 """Tracked frames of a robot that may wait for mapping: those of a second at 30 Hz."""

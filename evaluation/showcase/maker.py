@@ -25,10 +25,10 @@ from evaluation.protocol.trials import (
     noisy_start,
     sequence_starts,
 )
+from evaluation.runs.tracked import Tracked
 from evaluation.showcase.showcase import LocalizationStep, Showcase
 from evaluation.truth.relation import true_T_ground_mav
 from evaluation.truth.surface_error import depth_error
-from evaluation.truth.tracking_quality import Tracked
 from sim.truth import Truth
 
 PANELS = 3

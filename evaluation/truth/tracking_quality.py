@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.se3 import SE3
-from airground.core.trajectory import Trajectory
 from airground.slam.front_end import Tracking
 from evaluation.results.row_writer import RowWriter
+from evaluation.runs.tracked import Tracked
 from evaluation.runs.watched_front_end import FrontEndLog
 from evaluation.truth.consistency import consistency
 from evaluation.truth.trajectory_error import aligned_errors, trajectory_error
@@ -21,28 +20,6 @@ ERROR_STAGE = "trajectory_error"
 SLAM_STAGE = {"mav": "mono_slam", "ground": "rgbd_slam"}
 DRAWN_EVERY_NS = 100_000_000
 """Errors over time are kept this far apart."""
-
-
-@dataclass(frozen=True, eq=False)
-class Tracked:
-    """What a front end left of a recording.
-
-    Attributes:
-        robot: "mav" or "ground".
-        front_end: What it said, image by image.
-        final: The poses that it believed in at the end.
-        slam: Whether it was SLAM, whose times mean something.
-    """
-
-    robot: str
-    front_end: FrontEndLog
-    final: Trajectory | None
-    slam: bool
-
-    def final_poses(self) -> list[tuple[int, SE3]]:
-        if self.final is None:
-            return []
-        return [(int(stamp), self.final[i]) for i, stamp in enumerate(self.final.stamps_ns)]
 
 
 def add_tracking(out: RowWriter, tracked: Tracked, true_pose: Callable[[int], SE3]) -> None:

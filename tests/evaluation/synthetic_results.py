@@ -12,8 +12,9 @@ from airground.core.surface import AerialSurface, DepthMap
 from airground.core.trajectory import Trajectory
 from evaluation.realtime.live_summary import STAGE
 from evaluation.report.published import TABLE_I
+from evaluation.results.condition import Condition
 from evaluation.results.row_writer import RowWriter
-from evaluation.results.table import Condition, ResultTable, Row
+from evaluation.results.table import ResultTable, Row
 from evaluation.showcase.showcase import LocalizationStep, Showcase
 
 BEST = Condition("best", "oracle exact", "nominal", "known")

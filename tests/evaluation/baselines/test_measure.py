@@ -17,8 +17,9 @@ from evaluation.cli import parse
 from evaluation.commands.reproduce import Reproduce
 from evaluation.protocol.trials import refine_sighting, spread_evenly, trial_sightings
 from evaluation.report.baselines import baseline_table, baseline_trials
+from evaluation.results.condition import Condition
 from evaluation.results.row_writer import RowWriter
-from evaluation.results.table import Condition, ResultTable
+from evaluation.results.table import ResultTable
 from tests.evaluation.baselines.closed_worlds import T_GROUND_MAV, boxes_on_floor, given_of
 
 CONDITION = Condition("best", "slam", "nominal", "known")

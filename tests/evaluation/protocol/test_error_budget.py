@@ -22,8 +22,9 @@ from evaluation.protocol.true_stages import (
     with_true_surface,
 )
 from evaluation.report.budget import budget_figure, budget_table
+from evaluation.results.condition import Condition
 from evaluation.results.row_writer import RowWriter
-from evaluation.results.table import Condition, ResultTable
+from evaluation.results.table import ResultTable
 from evaluation.truth.relation import true_T_ground_mav
 from sim.truth import Truth
 

@@ -7,10 +7,13 @@ from dataclasses import replace
 import pytest
 
 from airground.config import Config, MonocularSlam, paper
+from airground.core.se3 import SE3
+from airground.core.trajectory import Trajectory
 from airground.errors import InputError
 from evaluation.commands.words import PoseWords
 from evaluation.protocol.setups import Setup, grouped_by_maps, with_companions, with_localization
-from evaluation.truth.oracle import EXACT, PAPER_DRIFT
+from evaluation.runs.given import Given
+from evaluation.truth.pose_noise import EXACT, PAPER_DRIFT
 
 
 def test_slam_is_the_default_and_the_truth_stands_beside_it() -> None:
@@ -41,6 +44,18 @@ def test_what_was_asked_for_is_not_measured_twice() -> None:
 )
 def test_who_runs_slam(poses: str, robots: set[str]) -> None:
     assert Setup(Config(), poses).slam_robots() == robots  # type: ignore[arg-type]
+
+
+def test_the_truth_is_asked_for_by_oracles_only() -> None:
+    path = Trajectory.from_poses([0], [SE3.identity()])
+    brought = Given(mav=path, ground=path)
+    assert not Setup(Config()).needs_truth()
+    assert Setup(Config(), "slam, exact mav").needs_truth()
+    assert not Setup(Config(), "oracle", given=brought).needs_truth()
+    assert Setup(Config(), "oracle", given=replace(brought, ground=None)).front_ends() == {
+        "mav": "file",
+        "ground": "oracle",
+    }
 
 
 def test_setups_share_maps_where_only_later_stages_differ() -> None:

@@ -7,7 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from evaluation.regression.measured import Measured
-from evaluation.results.table import Condition, ResultTable, Row
+from evaluation.results.condition import Condition
+from evaluation.results.table import ResultTable, Row
 
 CONDITION = Condition("best", "slam", "nominal", "known")
 SURFACES, SEQUENCES, ITERATIONS, TRIALS = 6, 3, 4, 4

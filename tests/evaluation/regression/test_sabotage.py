@@ -24,8 +24,9 @@ from evaluation.protocol.trials import localize_sequence
 from evaluation.protocol.wide_search import add_wide_searches
 from evaluation.regression.measured import Measured
 from evaluation.regression.verdict import Comparison, Verdict, compare
+from evaluation.results.condition import Condition
 from evaluation.results.row_writer import RowWriter
-from evaluation.results.table import Condition, ResultTable
+from evaluation.results.table import ResultTable
 from tests.localization.synthetic import aerial_points, box_heap, ground_points
 
 pytestmark = pytest.mark.slow

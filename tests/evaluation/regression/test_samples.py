@@ -10,7 +10,8 @@ import pytest
 from evaluation.regression.measured import figure
 from evaluation.regression.metrics import WATCHED
 from evaluation.regression.samples import Flight
-from evaluation.results.table import Condition, ResultTable, Row
+from evaluation.results.condition import Condition
+from evaluation.results.table import ResultTable, Row
 
 METRICS = {metric.name: metric for metric in WATCHED}
 CONDITION = Condition("best", "slam", "nominal", "known")

@@ -23,8 +23,9 @@ from evaluation.report.tables import (
     timing_table,
 )
 from evaluation.report.trajectories import trajectory_figures, trajectory_table
+from evaluation.results.condition import Condition
 from evaluation.results.run_info import RunInfo
-from evaluation.results.table import Condition, ResultTable, Row
+from evaluation.results.table import ResultTable, Row
 from tests.evaluation.synthetic_results import BEST, DRIFT, MINMAX, PAPER, SCENES, make_table
 
 RUN = RunInfo("0.1.0", "abc1234", 7, "some <processor>", 2)

@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 
 from airground.errors import InputError
-from evaluation.results.table import Condition, ResultTable, Row, shared_parts, short_labels
+from evaluation.results.condition import Condition, shared_parts, short_labels
+from evaluation.results.table import ResultTable, Row
 from tests.evaluation.synthetic_results import BEST, CONDITIONS, DRIFT, PAPER, SCENES, make_table
 
 

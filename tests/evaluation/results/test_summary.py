@@ -8,9 +8,10 @@ import pytest
 from rich.console import Console
 
 from airground.errors import InputError
+from evaluation.results.condition import Condition
 from evaluation.results.run_info import RunInfo
 from evaluation.results.summary import Summary, build_summary
-from evaluation.results.table import Condition, ResultTable, Row
+from evaluation.results.table import ResultTable, Row
 from evaluation.runs.screen import print_summary
 from tests.evaluation.synthetic_results import BEST, PAPER, SCENES, make_table
 

@@ -15,7 +15,7 @@ from airground.slam.front_end import Tracking
 from evaluation.protocol.setups import Setup
 from evaluation.runs.onlooker import Onlooker, Seen
 from evaluation.runs.recording import Measure
-from evaluation.truth.oracle import EXACT
+from evaluation.truth.pose_noise import EXACT
 from tests.evaluation.rerun_view.scripted_run import LENS, SECOND, TRUTH, ground_frame, mav_frame
 
 RECORDING = cast(

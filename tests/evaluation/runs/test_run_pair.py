@@ -28,7 +28,8 @@ from evaluation import cli, console
 from evaluation.datasets.formats import FORMATS, robots_for
 from evaluation.datasets.simulated import Simulated
 from evaluation.protocol.setups import Setup
-from evaluation.runs.given import Given, read_map
+from evaluation.runs.given import Given
+from evaluation.runs.given_map import read_map
 from evaluation.runs.pair import run_pair
 from sim.presets import NOMINAL
 from sim.recorder import record

@@ -16,8 +16,8 @@ from airground.io.recording import Recording
 from airground.io.tum import read_tum
 from airground.slam.front_end import TrackedPose, Tracking
 from evaluation.runs.recording import write_trajectories
+from evaluation.runs.tracked import Tracked
 from evaluation.runs.watched_front_end import WatchedFrontEnd
-from evaluation.truth.tracking_quality import Tracked
 
 STAMPS = (1_000_000_000, 1_033_333_333, 1_066_666_667)
 T_IMU_CAMERA = SE3.from_rotation_vector([np.pi, 0, 0], [0.05, 0.0, -0.02])

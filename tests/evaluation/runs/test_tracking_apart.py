@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import shutil
 import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -69,6 +71,18 @@ def test_frames_and_report_are_those_of_tracking_here(
         assert [stamp for stamp, _ in other.final_poses()] == [s for s, _ in one.final_poses()]
     assert told.peak_memory_mib > 50
     assert told.processor_s > 0
+
+
+def test_a_process_that_tracks_does_without_what_others_need() -> None:
+    """Of each there would be two more: some 100 MiB a process."""
+    script = (
+        "import sys; import evaluation.runs.robot_tracking_process\n"
+        "print(sorted({'open3d', 'mujoco', 'pandas', 'evo', 'matplotlib'} & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"
 
 
 def test_frames_can_be_kept(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:

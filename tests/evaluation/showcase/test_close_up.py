@@ -21,12 +21,12 @@ from evaluation.figures.style import save_picture
 from evaluation.protocol.setups import Setup
 from evaluation.runs.answer_log import AnswerLog
 from evaluation.runs.recording import RunResult
+from evaluation.runs.tracked import Tracked
 from evaluation.runs.watched_front_end import FrontEndLog
 from evaluation.showcase.close_up import CloseUp
 from evaluation.showcase.figures import showcase_figures
 from evaluation.showcase.showcase import Showcase
-from evaluation.truth.oracle import EXACT
-from evaluation.truth.tracking_quality import Tracked
+from evaluation.truth.pose_noise import EXACT
 from tests.evaluation.rerun_view import scripted_run as run
 from tests.evaluation.rerun_view.scripted_run import seen_events, show
 

@@ -9,7 +9,8 @@ from evo.core.trajectory import PoseTrajectory3D
 
 from airground.core.messages import MavImage
 from airground.core.se3 import SE3
-from evaluation.truth.oracle import PAPER_DRIFT, PoseNoise, oracle_front_ends
+from evaluation.truth.oracle import oracle_front_ends
+from evaluation.truth.pose_noise import PAPER_DRIFT, PoseNoise
 
 STAMPS = np.arange(0, 40_000_000_000, 33_333_333, dtype=np.int64)
 

@@ -9,11 +9,13 @@ from airground.core.messages import GroundImage, ImuSamples, MavImage
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.slam.front_end import ScaleEstimate, TrackedPose, Tracking
+from evaluation.results.condition import Condition
 from evaluation.results.row_writer import RowWriter
-from evaluation.results.table import Condition, ResultTable
+from evaluation.results.table import ResultTable
+from evaluation.runs.tracked import Tracked
 from evaluation.runs.watched_front_end import WatchedFrontEnd
 from evaluation.truth.consistency import consistency, level_alignment
-from evaluation.truth.tracking_quality import Tracked, add_tracking
+from evaluation.truth.tracking_quality import add_tracking
 
 STEP_NS = 50_000_000
 SIGMA_M, SIGMA_RAD = 0.01, 0.002

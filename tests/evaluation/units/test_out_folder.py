@@ -8,7 +8,8 @@ import pytest
 
 from airground.errors import InputError
 from evaluation.protocol.experiment import Outcome
-from evaluation.results.table import Condition, Row
+from evaluation.results.condition import Condition
+from evaluation.results.table import Row
 from evaluation.units.out_folder import LOCK, resumable_folder
 from evaluation.units.store import UnitStore
 

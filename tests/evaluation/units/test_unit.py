@@ -15,7 +15,7 @@ from airground.config import Config, MonocularSlam
 from airground.errors import InputError
 from evaluation.protocol.setups import Setup, with_localization
 from evaluation.protocol.trials import Protocol
-from evaluation.truth.oracle import PoseNoise
+from evaluation.truth.pose_noise import PoseNoise
 from evaluation.units import unit as module
 from evaluation.units.unit import Unit, grouped, key_of, task_of
 from sim.presets import HARSH, NOMINAL, with_heading_error, with_noise

@@ -1,0 +1,64 @@
+"""Under what something was measured: what every figure and table states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Condition:
+    """Under what something was measured; every figure and table states it.
+
+    Attributes:
+        preset: "paper" or "best".
+        poses: "slam", "oracle exact", "oracle with drift", or "slam, exact mav" (or ground).
+        sensors: "none", "nominal" or "harsh".
+        heading: "known" or "search".
+        variant: What else differs from the preset, in words; empty when nothing does.
+    """
+
+    preset: str
+    poses: str
+    sensors: str
+    heading: str
+    variant: str = ""
+
+    def parts(self) -> tuple[str, ...]:
+        """What it consists of, in words."""
+        poses = {
+            "slam": "poses from SLAM",
+            "oracle exact": "exact poses",
+            "oracle with drift": "poses with drift",
+            "slam, exact mav": "exact poses of the MAV, the ground robot's from SLAM",
+            "slam, exact ground": "exact poses of the ground robot, the MAV's from SLAM",
+        }
+        heading = {"known": "heading known", "search": "heading searched"}
+        return (
+            f"preset {self.preset}" + (f" ({self.variant})" if self.variant else ""),
+            poses.get(self.poses, self.poses),
+            f"{self.sensors} sensors" if self.sensors != "none" else "noise-free sensors",
+            heading.get(self.heading, self.heading),
+        )
+
+    def label(self) -> str:
+        """One line for captions."""
+        return ", ".join(self.parts())
+
+
+def short_labels(conditions: Sequence[Condition]) -> list[str]:
+    """Labels that name only what differs between the conditions."""
+    columns = list(zip(*(condition.parts() for condition in conditions), strict=True))
+    differ = [len(set(column)) > 1 for column in columns]
+    if not any(differ):
+        return [condition.label() for condition in conditions]
+    return [
+        ", ".join(part for part, kept in zip(condition.parts(), differ, strict=True) if kept)
+        for condition in conditions
+    ]
+
+
+def shared_parts(conditions: Sequence[Condition]) -> str:
+    """What the short labels leave out because all conditions share it."""
+    columns = list(zip(*(condition.parts() for condition in conditions), strict=True))
+    return ", ".join(column[0] for column in columns if len(set(column)) == 1)
