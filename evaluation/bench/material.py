@@ -41,7 +41,6 @@ from evaluation.realtime.drops import nothing_dropped
 from evaluation.runs.recording import pipeline_rng
 from evaluation.runs.tracking import TrackingTask
 from evaluation.runs.tracking_apart import TrackingApart
-from sim.truth import Truth
 
 PARTS = 10
 """Memory is looked at so many times over a recording."""
@@ -137,8 +136,7 @@ def play(recording: Recording, config: Config, whole: bool) -> tuple[Material, P
     Raises:
         InputError: No aerial surface could be aligned, so that there is nothing to work on.
     """
-    truth = Truth.open(recording.path)  # only oracles would look at it
-    task = TrackingTask(recording, truth, Setup(config), 0, nothing_dropped(recording))
+    task = TrackingTask(recording, None, Setup(config), 0, nothing_dropped(recording))
     pipeline = Pipeline(config, recording.mav, recording.ground, pipeline_rng(0))
     gathering = _Gathering(recording, config, pipeline)
     with TrackingApart(task) as tracking:

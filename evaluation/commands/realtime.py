@@ -25,7 +25,7 @@ class RealtimeWords:
     """Play the recording at its own rate; each robot tracks in a process of its own."""
     rate: Annotated[float, arg(metavar="FACTOR")] = 1.0
     """With --realtime: recorded seconds in one second."""
-    queue: Annotated[int, arg(metavar="N")] = 8
+    queue: Annotated[int, arg(metavar="N")] = 30
     """With --realtime: images that may wait before each tracker; more are dropped."""
     split: bool = False
     """With --realtime: the MAV sends compressed images and poses over the link set below."""

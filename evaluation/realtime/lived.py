@@ -18,8 +18,9 @@ class Playback:
 
     Attributes:
         rate: Recorded seconds in one second.
-        waiting_frames: How many images may wait before each tracker, 8 being a quarter of a
-            second at 30 Hz.
+        waiting_frames: How many images may wait before each tracker, 30 being a second at 30 Hz:
+            adjusting a whole map of ten minutes takes two thirds of that, and what has waited is
+            tracked several times as fast as it came.
         frames_under_way: How many tracked frames of each robot may wait before the mapper:
             five seconds at 30 Hz, some 360 MiB when all of it is full.
         radio: What lies between the MAV and the ground robot; None for one computer.
@@ -27,7 +28,7 @@ class Playback:
     """
 
     rate: float = 1.0
-    waiting_frames: int = 8
+    waiting_frames: int = 30
     frames_under_way: int = 150
     radio: RadioLimits | None = None
     patience_s: float = 2.0

@@ -31,14 +31,14 @@ class TrackingTask:
 
     Attributes:
         recording: What both robots sensed.
-        truth: Makes the poses of oracles.
+        truth: Makes the poses of oracles; None where the setup has none.
         setup: Says who tracks.
         seed: Of all that is random.
         drops: Which images to do without.
     """
 
     recording: Recording
-    truth: Truth
+    truth: Truth | None
     setup: Setup
     seed: int
     drops: DropList
