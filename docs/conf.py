@@ -4,7 +4,7 @@ from pydantic import BaseModel
 from sphinx.application import Sphinx
 
 from airground import __version__
-from evaluation.environment import prepare
+from evaluation.setup.environment import prepare
 
 prepare()  # Modules are imported for their docstrings; MuJoCo wants to know how to render.
 

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from airground import __version__
-from evaluation import console
-from evaluation.environment import prepare
+from evaluation.setup import console
+from evaluation.setup.environment import prepare
 
 if TYPE_CHECKING:
     from evaluation.commands.words import Verb

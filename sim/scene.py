@@ -134,8 +134,9 @@ class GroundPath(Part):
     waypoints: Annotated[tuple[tuple[float, float, float], ...], Field(min_length=2)]
     """x [m], y [m] and heading [deg, 0 looks along +x, counter-clockwise]."""
     stop_at_overlap: Fraction | None = None
-    """The robot stops as soon as it has seen this share of what the MAV flies over (the median
-    that `sim.overlap` measures); without it, it drives all the way. The heap stays the same."""
+    """The robot stops as soon as it has seen this share of what the MAV flies over (the
+    median that `sim.robots.overlap` measures); without it, it drives all the way. The heap stays
+    the same."""
 
 
 class Scene(Part):

@@ -9,7 +9,7 @@ Markers (declared in pyproject.toml):
 
 from __future__ import annotations
 
-from evaluation.environment import prepare
+from evaluation.setup.environment import prepare
 
 # Before any test module imports a library that reads it.
 prepare()

@@ -13,6 +13,30 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 ROOMS = ("airground", "sim", "evaluation")
+EVALUATION_LAYERS = (
+    "setup",
+    "table",
+    "run",
+    "measure",
+    "judge",
+    "show",
+    "bench",
+    "datasets",
+    "commands",
+    "cli",
+)
+"""Each imports only those before it, and itself."""
+SIM_ROOMS = (
+    "interrupts",
+    "scene",
+    "geometry",
+    "appearance",
+    "world",
+    "robots",
+    "sensors",
+    "recording",
+)
+"""Likewise."""
 STAGES = ("slam", "dense", "localization", "refinement", "augmentation", "ground_map")
 """Modules and packages of `airground` that only those below may bring together."""
 SHARED = ("core", "config", "errors")
@@ -88,6 +112,31 @@ def test_sim_imports_only_core_io_and_errors() -> None:
     ]
     assert wrong == []
     assert importing(sources("sim"), "evaluation", "tests") == []
+
+
+def test_layers_of_the_evaluator_import_only_those_below() -> None:
+    assert climbing("evaluation", EVALUATION_LAYERS) == []
+
+
+def test_rooms_of_the_simulator_import_only_those_below() -> None:
+    assert climbing("sim", SIM_ROOMS) == []
+
+
+def climbing(package: str, layers: tuple[str, ...]) -> list[str]:
+    """ "file imports name", for every import of a layer that is not below the file's own."""
+    wrong = []
+    for file in sources(package):
+        layer = Path(file).parts[1].removesuffix(".py")
+        if layer == "__init__":
+            continue
+        assert layer in layers, f"{file}: {layer} has no place among the layers of {package}"
+        below = layers[: layers.index(layer) + 1]
+        wrong += [
+            f"{file} imports {name}"
+            for name in imports(file)
+            if name.startswith(f"{package}.") and name.split(".")[1] not in below
+        ]
+    return wrong
 
 
 def test_stages_do_not_import_each_other() -> None:
@@ -250,7 +299,7 @@ def test_every_import_is_a_declared_dependency() -> None:
     extras = project["optional-dependencies"]
     for_tests = declared | {_distribution(line) for line in extras["dev"]}
     for_baselines = declared | {_distribution(line) for line in extras["baselines"]}
-    baselines = {*sources("evaluation/baselines"), *PEERS}
+    baselines = {*sources("evaluation/measure/baselines"), *PEERS}
     assert _undeclared(sorted(set(sources(*ROOMS)) - baselines), declared) == []
     assert _undeclared(sorted(baselines), for_baselines) == []
     assert _undeclared(sources("tests"), for_tests) == []

@@ -13,9 +13,9 @@ from pydantic import BaseModel
 
 from airground.config import Config
 from evaluation.cli import VERBS
-from evaluation.results.folder import CONFIG, SHOWCASE, SUMMARY, TABLE
-from evaluation.results.summary import Summary
-from evaluation.results.table import ResultTable
+from evaluation.judge.results import CONFIG, SHOWCASE, SUMMARY, TABLE
+from evaluation.judge.summary import Summary
+from evaluation.table.rows import ResultTable
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]

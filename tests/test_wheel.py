@@ -35,7 +35,7 @@ def test_the_wheel_holds_what_it_needs_and_no_more(wheel: Path) -> None:
     rooms = {name.partition("/")[0] for name in names if ".dist-info/" not in name}
     assert rooms == {"airground", "evaluation", "scenes", "sim"}
     assert {f"scenes/{scene.name}" for scene in (ROOT / "scenes").glob("*.toml")} <= set(names)
-    assert {"evaluation/report/report.html.j2", "evaluation/accepted.json"} <= set(names)
+    assert {"evaluation/show/report/report.html.j2", "evaluation/accepted.json"} <= set(names)
     assert not any("__pycache__" in name for name in names)
 
 

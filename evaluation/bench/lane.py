@@ -18,7 +18,7 @@ from evaluation.bench.probe import probe
 from evaluation.bench.row import Contender, Floor, Speed, Work
 from evaluation.bench.rows import BY_NAME
 from evaluation.bench.sampler import Turn, take_turn
-from evaluation.environment import settle
+from evaluation.setup.environment import settle
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 from airground.errors import AirgroundError
-from evaluation.environment import prepare
+from evaluation.setup.environment import prepare
 from sim.interrupts import deaf_children, end_children
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from evaluation.bench.lane import Facts, Lane, Opened
     from evaluation.bench.row import Contender
     from evaluation.bench.sampler import Turn
-    from evaluation.realtime.live_summary import LiveSummary
+    from evaluation.judge.live_summary import LiveSummary
 
 P = ParamSpec("P")
 T = TypeVar("T")

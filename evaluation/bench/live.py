@@ -7,11 +7,11 @@ from pathlib import Path
 from airground.config import Config
 from airground.errors import InputError
 from airground.io.recording import Recording
-from evaluation.protocol.setups import Setup
-from evaluation.realtime.live_run import run_live
-from evaluation.realtime.live_summary import LiveSummary, live_summary
-from evaluation.realtime.lived import Playback
-from sim.truth import Truth
+from evaluation.judge.live_summary import LiveSummary, live_summary
+from evaluation.run.live.live_run import run_live
+from evaluation.run.live.playback import Playback
+from evaluation.setup.setups import Setup
+from sim.recording.truth import Truth
 
 
 def play_live(path: Path) -> LiveSummary:

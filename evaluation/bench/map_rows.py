@@ -18,7 +18,7 @@ from airground.refinement import refine
 from evaluation.bench import floors
 from evaluation.bench.material import Material
 from evaluation.bench.row import Work
-from evaluation.report.published import START_NOISE_DEG, START_NOISE_M
+from evaluation.setup.published import START_NOISE_DEG, START_NOISE_M
 
 SLANTED = np.ones(3) / np.sqrt(3.0)
 """Along this axis the start is shifted and turned: all six directions are to be found."""

@@ -35,12 +35,12 @@ from airground.ground_map import GroundMap
 from airground.ground_map.blocked_field import BlockedField
 from airground.io.recording import Recording
 from airground.pipeline import Pipeline, Sighting, sight
-from evaluation.process_memory import resident_mib
-from evaluation.protocol.setups import Setup
-from evaluation.realtime.drops import nothing_dropped
-from evaluation.runs.recording import pipeline_rng
-from evaluation.runs.tracking import TrackingTask
-from evaluation.runs.tracking_apart import TrackingApart
+from evaluation.run.drops import nothing_dropped
+from evaluation.run.recording import pipeline_rng
+from evaluation.run.tracking import TrackingTask
+from evaluation.run.tracking_process import TrackingApart
+from evaluation.setup.memory import resident_mib
+from evaluation.setup.setups import Setup
 
 PARTS = 10
 """Memory is looked at so many times over a recording."""

@@ -12,8 +12,8 @@ import gc
 from collections.abc import Callable
 from pathlib import Path
 
-from evaluation.environment import hand_back_memory
-from evaluation.process_memory import held_kib
+from evaluation.setup.environment import hand_back_memory
+from evaluation.setup.memory import held_kib
 
 CLEAR_REFS = Path("/proc/self/clear_refs")
 RESET_HIGH_WATER_MARK = "5"

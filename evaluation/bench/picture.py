@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 
 from evaluation.bench.report import BenchReport, CurveResult, RowResult
-from evaluation.figures.style import FAINT, INK, PAPER, SERIES, SMALL_PT, WIDE_IN, styled
+from evaluation.show.figures.style import FAINT, INK, PAPER, SERIES, SMALL_PT, WIDE_IN, styled
 
 HERE, PEER = SERIES[0], SERIES[1]
 BAR = 0.56

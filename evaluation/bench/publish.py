@@ -6,11 +6,11 @@ import sys
 from pathlib import Path
 
 from airground.errors import InputError
-from evaluation import console
 from evaluation.bench.picture import bench_figure, curves_figure
 from evaluation.bench.report import BenchReport
 from evaluation.bench.table import markdown
-from evaluation.figures.style import PICTURE_DPI
+from evaluation.setup import console
+from evaluation.show.figures.style import PICTURE_DPI
 
 BEGIN = "<!-- what airground bench found: begin -->"
 END = "<!-- what airground bench found: end -->"

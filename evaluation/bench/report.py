@@ -11,8 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from evaluation.bench.load import LoadAverage
 from evaluation.bench.sampler import Turn
-from evaluation.checked_json import read_checked
-from evaluation.realtime.live_summary import LiveSummary
+from evaluation.judge.live_summary import LiveSummary
+from evaluation.setup.checked_json import read_checked
 
 SCHEMA: Literal[1] = 1
 

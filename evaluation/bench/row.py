@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from evaluation.bench.material import Material
-from evaluation.report.published import TABLE_I, TimedStage
+from evaluation.setup.published import TABLE_I, TimedStage
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from airground.errors import InputError
 from evaluation.bench import dense_rows, localization_rows, map_rows, peers
 from evaluation.bench.row import Peer, Row, of_table
-from evaluation.report.published import TimedStage
+from evaluation.setup.published import TimedStage
 
 DENSE, GLOBAL = "Dense reconstruction", "Global localization"
 REFINEMENT, INPUT = "Pose refinement", "Input"

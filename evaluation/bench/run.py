@@ -33,7 +33,7 @@ from evaluation.bench.report import (
 from evaluation.bench.row import Contender, Row, Speed
 from evaluation.bench.rows import BY_NAME, LIVE, PIPELINE, PLAYED
 from evaluation.bench.sampler import Turn, interleaved, wall_ratio
-from evaluation.results.run_info import RunInfo
+from evaluation.setup.run_info import RunInfo
 
 Say = Callable[[str], None]
 """Is told what is being done."""

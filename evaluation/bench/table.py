@@ -7,7 +7,7 @@ from rich.table import Table
 from rich.text import Text
 
 from evaluation.bench.report import BenchReport, CurveResult, LaneTiming, RowResult
-from evaluation.report.live import live_rows
+from evaluation.show.report.screen import live_rows
 
 ABSENT = "-"
 BUSY_CORES = 0.2

@@ -32,10 +32,10 @@ class Accept(Verb):
     def main(self) -> None:
         from datetime import UTC, datetime
 
-        from evaluation.regression.accepted import Accepted
-        from evaluation.regression.measured import Measured
-        from evaluation.results.folder import SUMMARY, read_table
-        from evaluation.results.summary import Summary
+        from evaluation.judge.accepted import Accepted
+        from evaluation.judge.measured import Measured
+        from evaluation.judge.results import SUMMARY, read_table
+        from evaluation.judge.summary import Summary
 
         before = Accepted.read(self.to) if self.to.exists() else None
         measured = Measured.of(read_table(self.results))

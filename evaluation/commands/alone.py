@@ -52,9 +52,9 @@ class AloneWords:
         from airground.core.cloud import Source
         from airground.io.open_robot import open_robot
         from airground.slam import front_ends
-        from evaluation.output import fresh_folder
-        from evaluation.runs.alone import print_alone, run_alone, write_alone
-        from evaluation.truth.camera import true_camera
+        from evaluation.run.alone import print_alone, run_alone, write_alone
+        from evaluation.setup.output import fresh_folder
+        from evaluation.table.true_camera import true_camera
 
         robot = Source.MAV if self.only == "mav" else Source.GROUND
         with fresh_folder(out) as folder:

@@ -48,7 +48,7 @@ class Bench(Verb, SensorWord, SeedWord):
         from evaluation.bench.rows import checked_names
         from evaluation.bench.run import run_benchmark
         from evaluation.bench.table import print_table
-        from evaluation.output import check_free
+        from evaluation.setup.output import check_free
 
         names = checked_names([name for name in self.rows.split(",") if name])
         seconds = in_range("--seconds-a-row", self.seconds_a_row, low=0.0, high=3600)
@@ -70,9 +70,9 @@ class Bench(Verb, SensorWord, SeedWord):
             print_table(report, Console())
 
     def _record(self, path: Path) -> Path:
-        from sim.presets import sensor_preset
-        from sim.recorder import record
+        from sim.recording.recorder import record
         from sim.scene import load_scene
+        from sim.sensors.presets import sensor_preset
 
         sensors, seed = sensor_preset(self.sensors), self.checked_seed()
         record(load_scene(SCENE), seed, sensors, path, workers=self.workers())
@@ -83,8 +83,8 @@ class Bench(Verb, SensorWord, SeedWord):
             return
         from evaluation.bench.picture import bench_figure, curves_figure
         from evaluation.bench.table import markdown
-        from evaluation.figures.style import save_figure
-        from evaluation.output import fresh_folder
+        from evaluation.setup.output import fresh_folder
+        from evaluation.show.figures.style import save_figure
 
         with fresh_folder(self.out) as folder:
             (folder / "bench.json").write_text(report.to_json(), encoding="utf-8")

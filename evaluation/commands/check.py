@@ -11,7 +11,7 @@ from tyro.conf import Positional, arg
 from evaluation.commands.words import Verb
 
 if TYPE_CHECKING:
-    from evaluation.regression.measured import Measured
+    from evaluation.judge.measured import Measured
 
 ACCEPTED = Path(__file__).parents[1] / "accepted.json"
 
@@ -35,26 +35,26 @@ class Check(Verb):
     """Write one test case a metric for continuous integration."""
 
     def main(self) -> int:
-        from evaluation.regression import tables
-        from evaluation.regression.junit import junit
-        from evaluation.regression.measured import Measured
-        from evaluation.regression.verdict import Verdict, compare
-        from evaluation.results.folder import read_table
+        from evaluation.judge.measured import Measured
+        from evaluation.judge.results import read_table
+        from evaluation.judge.verdict import Verdict, compare
+        from evaluation.show.comparison import verdict_table
+        from evaluation.show.comparison.junit import junit
 
         before = self._reference()
         after = Measured.of(read_table(self.results), before.condition)
         comparison = compare(before, after)
-        tables.print_comparison(comparison)
+        verdict_table.print_comparison(comparison)
         if self.markdown is not None:
-            self.markdown.write_text(tables.markdown(comparison), encoding="utf-8")
+            self.markdown.write_text(verdict_table.markdown(comparison), encoding="utf-8")
         if self.junit is not None:
             self.junit.write_text(junit(comparison), encoding="utf-8")
         return int(bool(comparison.of(Verdict.WORSE)))
 
     def _reference(self) -> Measured:
-        from evaluation.regression.accepted import Accepted
-        from evaluation.regression.measured import Measured
-        from evaluation.results.folder import read_table
+        from evaluation.judge.accepted import Accepted
+        from evaluation.judge.measured import Measured
+        from evaluation.judge.results import read_table
 
         if self.against.is_dir():
             return Measured.of(read_table(self.against))

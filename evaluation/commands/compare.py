@@ -23,10 +23,10 @@ class Compare(Verb, OutWord):
     """Folders that run or reproduce has written, the reference first."""
 
     def main(self) -> None:
-        from evaluation.compare.page import PAGE, write_comparison
-        from evaluation.compare.runs import against, read_runs
-        from evaluation.output import fresh_folder
-        from evaluation.regression.tables import conclusion
+        from evaluation.judge.runs import against, read_runs
+        from evaluation.setup.output import fresh_folder
+        from evaluation.show.comparison.page import PAGE, write_comparison
+        from evaluation.show.comparison.verdict_table import conclusion
 
         reference, *others = read_runs(self.runs)
         helds = [against(reference, run) for run in others]

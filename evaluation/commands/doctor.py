@@ -15,7 +15,7 @@ class Doctor(Verb):
     """
 
     def main(self) -> int:
-        from evaluation.doctor import Health, examine, show
+        from evaluation.setup.doctor import Health, examine, show
 
         findings = examine()
         show(findings)

@@ -23,13 +23,14 @@ class Evaluate(Verb, OutWord):
     """Folders that run or reproduce has written."""
 
     def main(self) -> None:
-        from evaluation.output import fresh_folder
-        from evaluation.results.folder import merged, read_results
-        from evaluation.runs.screen import print_summary
+        from evaluation.judge.results import merged, read_results
+        from evaluation.setup.output import fresh_folder
+        from evaluation.show.report.page import write_results
+        from evaluation.show.report.screen import print_summary
 
         if not self.runs:
             raise InputError("no RUN given: name at least one folder of run or reproduce")
         results = merged([read_results(run) for run in self.runs])
         with fresh_folder(self.out) as folder:
-            summary = results.write(folder)
+            summary = write_results(results, folder)
         print_summary(summary)

@@ -31,7 +31,7 @@ class Export(Verb, OutWord):
     def main(self) -> None:
         from evaluation.datasets.formats import FORMATS, robots_for
         from evaluation.datasets.simulated import Simulated
-        from evaluation.output import fresh_folder
+        from evaluation.setup.output import fresh_folder
 
         robots = robots_for(self.format, self.robot)
         with fresh_folder(self.out) as folder:

@@ -12,7 +12,7 @@ from airground.errors import InputError
 from evaluation.commands.words import OutWord, Verb
 
 if TYPE_CHECKING:
-    from evaluation.showcase.showcase import Showcase
+    from evaluation.measure.showcase.showcase import Showcase
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,10 +28,10 @@ class Gallery(Verb, OutWord):
     """Also draw how the first aerial surface finds its place, as an animated WebP."""
 
     def main(self) -> None:
-        from evaluation.figures.style import save_picture
-        from evaluation.output import fresh_folder
-        from evaluation.report.figures import report_figures
-        from evaluation.results.folder import TABLE, read_results
+        from evaluation.judge.results import TABLE, read_results
+        from evaluation.setup.output import fresh_folder
+        from evaluation.show.figures.style import save_picture
+        from evaluation.show.report.figures import report_figures
 
         if self.run.is_dir() and not (self.run / TABLE).exists():
             raise InputError(
@@ -50,7 +50,7 @@ class Gallery(Verb, OutWord):
                 self._animate(folder, results.showcase)
 
     def _animate(self, folder: Path, showcase: Showcase) -> None:
-        from evaluation.showcase.landing import save_landing
+        from evaluation.show.gallery.landing import save_landing
 
         if showcase.T_ground_mav is None:
             raise InputError(f"{self.run}: --animation: its surface was not aligned")

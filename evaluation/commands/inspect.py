@@ -29,8 +29,8 @@ class Inspect(Verb):
     """Print JSON in place of a table."""
 
     def main(self) -> int:
-        from evaluation.inspection.findings import Verdict, as_json, show
-        from evaluation.inspection.inspect_dataset import inspect_dataset
+        from evaluation.datasets.inspection.findings import Verdict, as_json, show
+        from evaluation.datasets.inspection.inspect_dataset import inspect_dataset
 
         layout, findings = inspect_dataset(self.dataset, self.calibration)
         if self.json:

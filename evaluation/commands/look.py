@@ -13,8 +13,8 @@ from airground.errors import InputError
 if TYPE_CHECKING:
     from airground.core.cloud import Source
     from airground.core.messages import RobotCalibration
-    from evaluation.runs.onlooker import Onlooker
-    from sim.truth import Truth
+    from evaluation.run.onlooker import Onlooker
+    from sim.recording.truth import Truth
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,7 +57,7 @@ class LookWords:
         if not self.looks:
             yield []
             return
-        from evaluation.rerun_view.run_view import RUN_FILE, RunView
+        from evaluation.show.rerun_view.run_view import RUN_FILE, RunView
 
         with ExitStack() as stack:
             viewer = stack.enter_context(_viewer()) if self.rerun_live else None
@@ -69,7 +69,7 @@ class LookWords:
 @contextmanager
 def _viewer() -> Iterator[str]:
     """A viewer that waits for data; gives its address."""
-    from evaluation.rerun_view import viewer
+    from evaluation.show.rerun_view import viewer
 
     ports = viewer.free_ports()
     if viewer.has_screen():

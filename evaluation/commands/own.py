@@ -16,10 +16,9 @@ if TYPE_CHECKING:
 
     from airground.core.cloud import Source
     from airground.core.messages import RobotCalibration
-    from evaluation.protocol.setups import Setup
-    from evaluation.runs.given import Given
-    from evaluation.runs.onlooker import Onlooker
-    from sim.truth import Truth
+    from evaluation.run.onlooker import Onlooker
+    from evaluation.setup.setups import Given, Setup
+    from sim.recording.truth import Truth
 
     Watching = Callable[
         [Path, str, Mapping[Source, RobotCalibration], Truth | None],
@@ -88,9 +87,9 @@ class OwnWords:
         from airground.core.cloud import Source
         from airground.io.open_robot import open_robot
         from airground.io.pair import Pair
-        from evaluation.output import fresh_folder
-        from evaluation.runs.pair import print_pair, run_pair, write_pair
-        from evaluation.settings import write_config
+        from evaluation.run.pair import print_pair, run_pair, write_pair
+        from evaluation.setup.output import fresh_folder
+        from evaluation.setup.settings import write_config
 
         assert self.mav is not None
         assert self.ground is not None
@@ -121,8 +120,8 @@ class OwnWords:
 
     def _given(self) -> Given:
         from airground.io.tum import read_tum
-        from evaluation.runs.given import Given
-        from evaluation.runs.given_map import read_map
+        from evaluation.run.given_map import read_map
+        from evaluation.setup.setups import Given
 
         return Given(
             mav=read_tum(self.mav_trajectory) if self.mav_trajectory else None,

@@ -13,8 +13,8 @@ from airground.errors import InputError
 from evaluation.commands.words import in_range
 
 if TYPE_CHECKING:
-    from evaluation.realtime.lived import Playback
-    from evaluation.realtime.radio import RadioLimits
+    from evaluation.run.live.playback import Playback
+    from evaluation.run.live.radio_link import RadioLimits
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +64,7 @@ class RealtimeWords:
 
     def playback(self) -> Playback:
         """How the recording is to be played."""
-        from evaluation.realtime.lived import Playback
+        from evaluation.run.live.playback import Playback
 
         return Playback(self.rate, self.queue, radio=self.radio())
 
@@ -76,7 +76,7 @@ class RealtimeWords:
 
     def radio(self) -> RadioLimits | None:
         """What lies between the MAV and the ground robot; None for one computer."""
-        from evaluation.realtime.radio import RadioLimits
+        from evaluation.run.live.radio_link import RadioLimits
 
         if not self.split:
             return None

@@ -20,8 +20,8 @@ from evaluation.commands.words import (
 )
 
 if TYPE_CHECKING:
-    from evaluation.protocol.reproduce import Plan
-    from evaluation.regression.suite import SuitePlan
+    from evaluation.measure.plans.reproduce import Plan
+    from evaluation.measure.plans.suite import SuitePlan
 
 SCENES = ("indoor_a", "indoor_b", "indoor_c", "outdoor", "flat")
 FLIGHTS, SEQUENCES, TRIALS, BASELINES = 2, 6, 9, 12
@@ -87,10 +87,11 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, Cluste
     The results are the same, but for times, which then include waiting for images."""
 
     def main(self) -> None:
-        from evaluation.results.folder import Results
-        from evaluation.runs.screen import print_summary
-        from evaluation.units.crew import Crew
-        from evaluation.units.out_folder import resumable_folder
+        from evaluation.judge.results import Results
+        from evaluation.measure.work.crew import Crew
+        from evaluation.measure.work.out_folder import resumable_folder
+        from evaluation.show.report.page import write_results
+        from evaluation.show.report.screen import print_summary
 
         if self.render and self.recordings is not None:
             raise InputError("--render keeps no recordings; leave out --recordings")
@@ -103,12 +104,12 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, Cluste
             recordings = self.recordings or folder.recordings
             found = plan.measured(None if self.render else recordings, folder.store, crew)
             results = Results(found.table, setup.config, seed, found.showcase)
-            summary = results.write(folder.results)
+            summary = write_results(results, folder.results)
         print_summary(summary)
 
     def _suite(self, name: str) -> SuitePlan:
-        from evaluation.regression.suite import SUITES, SuitePlan
-        from sim.presets import sensor_preset
+        from evaluation.measure.plans.suite import SUITES, SuitePlan
+        from sim.sensors.presets import sensor_preset
 
         fixed = ("quick", "budget", "scenes", "flights", "sequences_per_flight")
         for field in (*fixed, "sequences", "trials", "baselines"):
@@ -120,11 +121,11 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, Cluste
 
     def plan(self) -> Plan:
         """What the words ask for, checked."""
-        from evaluation.protocol.reproduce import Plan
-        from evaluation.protocol.setups import with_companions
-        from evaluation.protocol.trials import Protocol
-        from sim.presets import sensor_preset
+        from evaluation.measure.plans.reproduce import Plan
+        from evaluation.measure.protocol.trials import Protocol
+        from evaluation.setup.setups import with_companions
         from sim.scene import load_scene
+        from sim.sensors.presets import sensor_preset
 
         setup = self.setup()
         if self.budget and setup.poses != "slam":

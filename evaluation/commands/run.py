@@ -18,11 +18,11 @@ from evaluation.commands.words import OutWord, SeedWord, SetupWords, Verb
 
 if TYPE_CHECKING:
     from airground.io.recording import Recording
-    from evaluation.protocol.setups import Setup
-    from evaluation.realtime.drops import DropList
-    from evaluation.runs.onlooker import Onlooker
-    from evaluation.runs.recording import RunResult
-    from sim.truth import Truth
+    from evaluation.run.drops import DropList
+    from evaluation.run.onlooker import Onlooker
+    from evaluation.run.recording import RunResult
+    from evaluation.setup.setups import Setup
+    from sim.recording.truth import Truth
 
 DROPPED = "dropped.json"
 
@@ -62,12 +62,13 @@ class Run(Verb, OwnWords, AloneWords, RealtimeWords, LookWords, SetupWords, Seed
         from airground.core.cloud import Source
         from airground.io.layout import HEADER
         from airground.io.recording import Recording
-        from evaluation.output import fresh_folder
-        from evaluation.results.folder import Results
-        from evaluation.runs.recording import write_run
-        from evaluation.runs.screen import print_summary
-        from evaluation.showcase.close_up import CloseUp
-        from sim.truth import Truth
+        from evaluation.judge.results import Results
+        from evaluation.measure.showcase.close_up import CloseUp
+        from evaluation.run.recording import write_run
+        from evaluation.setup.output import fresh_folder
+        from evaluation.show.report.page import write_results
+        from evaluation.show.report.screen import print_summary
+        from sim.recording.truth import Truth
 
         if path.is_dir() and not (path / HEADER).exists():
             raise InputError(
@@ -88,7 +89,7 @@ class Run(Verb, OwnWords, AloneWords, RealtimeWords, LookWords, SetupWords, Seed
             write_run(folder, recording, result)
             drops.write(folder / DROPPED)
             showcase = None if closeup is None else closeup.showcase(result)
-            summary = Results(result.table, setup.config, seed, showcase).write(folder)
+            summary = write_results(Results(result.table, setup.config, seed, showcase), folder)
         print_summary(summary)
 
     def _result(
@@ -100,9 +101,9 @@ class Run(Verb, OwnWords, AloneWords, RealtimeWords, LookWords, SetupWords, Seed
         onlookers: Sequence[Onlooker],
     ) -> tuple[RunResult, DropList]:
         """What the run leaves, and which frames it did without."""
-        from evaluation.realtime.drops import DropList, nothing_dropped
-        from evaluation.realtime.live_run import run_live
-        from evaluation.runs.recording import run_recording
+        from evaluation.run.drops import DropList, nothing_dropped
+        from evaluation.run.live.live_run import run_live
+        from evaluation.run.recording import run_recording
 
         if self.realtime:
             return run_live(recording, truth, setup, seed, self.playback())

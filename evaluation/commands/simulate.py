@@ -50,10 +50,10 @@ class Simulate(Verb, SensorWord, SeedWord, OutWord):
             self._make_dataset(self.seeds)
 
     def _record_one(self) -> None:
-        from evaluation.output import check_free
-        from sim.presets import sensor_preset
-        from sim.recorder import record
+        from evaluation.setup.output import check_free
+        from sim.recording.recorder import record
         from sim.scene import load_scene
+        from sim.sensors.presets import sensor_preset
 
         if len(self.scenes) != 1 or self.split or self.jobs != 1:
             raise InputError("several scenes, --split and --jobs: only with --seeds")

@@ -18,7 +18,7 @@ from evaluation.commands.words import (
 )
 
 if TYPE_CHECKING:
-    from evaluation.sweep.plan import SweepPlan
+    from evaluation.measure.plans.sweep import SweepPlan
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,10 +48,10 @@ class Sweep(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, ClusterWor
     """Cut flights short."""
 
     def main(self) -> None:
-        from evaluation.sweep.findings import sweep, write_sweep
-        from evaluation.sweep.screen import print_sweep
-        from evaluation.units.crew import Crew
-        from evaluation.units.out_folder import resumable_folder
+        from evaluation.judge.readings import sweep
+        from evaluation.measure.work.crew import Crew
+        from evaluation.measure.work.out_folder import resumable_folder
+        from evaluation.show.sweep_results import print_sweep, write_sweep
 
         plan = self.plan()
         with (
@@ -64,11 +64,10 @@ class Sweep(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, ClusterWor
 
     def plan(self) -> SweepPlan:
         """What the words ask for, checked as far as can be without flying."""
-        from evaluation.protocol.trials import Protocol
-        from evaluation.sweep.plan import SweepPlan
-        from evaluation.sweep.vary import parse_vary
-        from sim.presets import sensor_preset
+        from evaluation.measure.plans.sweep import SweepPlan, parse_vary
+        from evaluation.measure.protocol.trials import Protocol
         from sim.scene import load_scene
+        from sim.sensors.presets import sensor_preset
 
         counts = {
             name: int(in_range(f"--{name}", getattr(self, name), low=1))

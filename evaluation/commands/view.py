@@ -27,7 +27,7 @@ class View(Verb):
     """Write one .rrd file that opens with the layout in any viewer of rerun."""
 
     def main(self) -> int | None:
-        from evaluation.rerun_view import viewer
+        from evaluation.show.rerun_view import viewer
 
         if self.serve and self.save is not None:
             raise InputError("--serve and --save: give one of them")
@@ -45,7 +45,7 @@ class View(Verb):
         return viewer.show(file)
 
     def _serve(self, file: Path) -> int:
-        from evaluation.rerun_view import viewer
+        from evaluation.show.rerun_view import viewer
 
         ports = viewer.free_ports()
         with viewer.serving(ports, file) as server:
@@ -61,7 +61,7 @@ def rerun_file(run: Path) -> Path:
     Raises:
         InputError: There is none.
     """
-    from evaluation.rerun_view.run_view import RUN_FILE
+    from evaluation.show.rerun_view.run_view import RUN_FILE
 
     if run.is_file():
         return run

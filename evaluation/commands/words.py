@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from tyro.conf import UseAppendAction, arg
 
 from airground.errors import InputError
-from evaluation.environment import usable_cores
+from evaluation.setup.environment import usable_cores
 
 if TYPE_CHECKING:
     from airground.config import Config
-    from evaluation.protocol.setups import Setup
-    from evaluation.truth.pose_noise import PoseNoise
+    from evaluation.setup.setups import PoseNoise, Setup
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,7 +99,7 @@ class PipelineWords:
     """One parameter, as in localization.particles=400; wins over --config."""
 
     def resolved_config(self) -> Config:
-        from evaluation.settings import resolve
+        from evaluation.setup.settings import resolve
 
         return resolve(self.preset, self.config, self.overrides, self.heading)
 
@@ -126,7 +125,7 @@ class PoseWords:
         Raises:
             InputError: A number is out of range, or there is no oracle to add it to.
         """
-        from evaluation.truth.pose_noise import EXACT, PoseNoise
+        from evaluation.setup.setups import EXACT, PoseNoise
 
         noise = PoseNoise(
             drift_mav_m=in_range("--drift-mav-cm", self.drift_mav_cm, high=100) / 100,
@@ -144,7 +143,7 @@ class SetupWords(PipelineWords, PoseWords):
     """All that makes a setup: the pipeline's parameters and the poses."""
 
     def setup(self) -> Setup:
-        from evaluation.protocol.setups import Setup
+        from evaluation.setup.setups import Setup
 
         return Setup(self.resolved_config(), self.poses, self.pose_noise())
 

@@ -22,15 +22,15 @@ from tempfile import TemporaryDirectory
 from rich.progress import track
 
 from airground.errors import AirgroundError, InputError
-from evaluation.checked_json import read_checked
 from evaluation.datasets.datasheet import datasheet
 from evaluation.datasets.plan import PLAN, Plan, World
-from evaluation.output import check_free
-from evaluation.units.crew import Crew
+from evaluation.measure.work.crew import Crew
+from evaluation.setup.checked_json import read_checked
+from evaluation.setup.output import check_free
 from sim.interrupts import end_with_parent
-from sim.presets import sensor_preset
-from sim.recorder import record
+from sim.recording.recorder import record
 from sim.scene import load_scene
+from sim.sensors.presets import sensor_preset
 
 SHEET, LOCK = "DATASHEET.md", ".lock"
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from evaluation.datasets.simulated import Simulated, copy_images
 from evaluation.datasets.views import View, Views, choose_views
-from sim.motion import ROBOTS, Robot
+from sim.robots.motion import ROBOTS, Robot
 
 PIXEL_CENTRE = 0.5
 MIN_VIEWS = 2

@@ -15,9 +15,9 @@ from airground.core.trajectory import Trajectory
 from airground.io.header import Header, read_header
 from airground.io.layout import HEADER, TRUTH
 from airground.io.tum import read_tum
-from sim.motion import ROBOTS
-from sim.presets import SensorPreset
+from sim.robots.motion import ROBOTS
 from sim.scene import Scene
+from sim.sensors.presets import SensorPreset
 
 CONVENTIONS = """\
 ## Frames and units

@@ -23,7 +23,7 @@ from airground.io.euroc import sensor_yaml
 from airground.io.ply import write_ply
 from evaluation.datasets.simulated import Simulated, copy_images
 from evaluation.datasets.true_points import sample_surface
-from sim.motion import RATE_HZ, Robot
+from sim.robots.motion import RATE_HZ, Robot
 
 YAML_START = "%YAML:1.0\n"
 """EuRoC's files begin so; OpenCV's reader insists on it."""

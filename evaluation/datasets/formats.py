@@ -16,7 +16,7 @@ from evaluation.datasets.mcap import write_bag
 from evaluation.datasets.nerfstudio import write_nerfstudio_folder
 from evaluation.datasets.simulated import Simulated
 from evaluation.datasets.tum import write_tum_folder
-from sim.motion import ROBOTS, Robot
+from sim.robots.motion import ROBOTS, Robot
 
 Robots = tuple[Robot, ...]
 

@@ -34,7 +34,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from airground.core.se3 import SE3
 from evaluation.datasets import ros_messages as ros
 from evaluation.datasets.simulated import Simulated
-from sim.motion import Robot
+from sim.robots.motion import Robot
 
 NAME = "recording"
 WORLD, BODY, IMU, CAMERA = "world", "base_link", "imu", "camera_optical"

@@ -23,7 +23,7 @@ from airground.core.se3 import SE3
 from airground.io.ply import write_ply
 from evaluation.datasets.simulated import Simulated, copy_images
 from evaluation.datasets.views import View, choose_views
-from sim.motion import Robot
+from sim.robots.motion import Robot
 
 PIXEL_CENTRE = 0.5
 MM_PER_M = 1000.0

@@ -10,8 +10,8 @@ from pydantic import BaseModel, ConfigDict
 from airground import __version__
 from airground.errors import InputError
 from airground.io.digests import bytes_digest
-from sim.presets import sensor_preset
 from sim.scene import load_scene
+from sim.sensors.presets import sensor_preset
 
 PLAN = "dataset.json"
 """The plan's file in the dataset."""

@@ -15,9 +15,9 @@ from airground.io.calibration import RobotTable
 from airground.io.image_source import ImageFiles
 from airground.io.layout import HEADER
 from airground.io.recording import Recording
-from sim.motion import Robot
-from sim.robot_motion import RobotMotion
-from sim.truth import Truth
+from sim.recording.truth import Truth
+from sim.robots.motion import Robot
+from sim.robots.robot_motion import RobotMotion
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
-from sim.truth import Truth
+from sim.recording.truth import Truth
 
 GREY = 128
 NEAR = 1e-3

@@ -20,7 +20,7 @@ from airground.io.euroc import camera_yaml
 from airground.io.plain_tum import ACCELEROMETER_AXES, DEPTH_UNITS_PER_M
 from airground.io.tum import write_accelerometer, write_tum
 from evaluation.datasets.simulated import Simulated, copy_images
-from sim.motion import Robot
+from sim.robots.motion import Robot
 
 SAME_FILES = (
     layout.GROUND_COLOUR_LIST,

@@ -12,7 +12,7 @@ from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
 from evaluation.datasets.simulated import Simulated
 from evaluation.datasets.true_points import Seen, colours_at, sample_surface, seen_by
-from sim.motion import Robot
+from sim.robots.motion import Robot
 
 EVERY = 10
 """Of all images every tenth: three a second. Who reconstructs from images wants no more."""

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from sim.presets import ImageNoise
 from sim.sensors.hashed_noise import gaussian, noise_key
+from sim.sensors.presets import ImageNoise
 
 MAX_SAMPLES = 32
 _PERIODS_S = (2.5, 20.0)

@@ -14,8 +14,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from airground.core.camera import PinholeCamera
-from sim.presets import DepthNoise
 from sim.sensors.hashed_noise import gaussian, noise_key
+from sim.sensors.presets import DepthNoise
 
 BASELINE_M = 0.075
 INFRARED_FOCAL_PX = 585.0

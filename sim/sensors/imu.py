@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.messages import ImuSamples
-from sim.presets import ImuNoise
+from sim.sensors.presets import ImuNoise
 
 
 def measure_imu(ideal: ImuSamples, noise: ImuNoise | None, rng: np.random.Generator) -> ImuSamples:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.messages import MagneticSamples
-from sim.presets import MagneticNoise
+from sim.sensors.presets import MagneticNoise
 
 
 def measure_field(

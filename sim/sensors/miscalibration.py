@@ -17,8 +17,8 @@ from airground.io.calibration import (
     RobotTable,
     pose_rows,
 )
-from sim.presets import ADIS16448, NOMINAL, CalibrationErrors, ImuNoise, SensorPreset
-from sim.robot_motion import Mounting
+from sim.robots.robot_motion import Mounting
+from sim.sensors.presets import ADIS16448, NOMINAL, CalibrationErrors, ImuNoise, SensorPreset
 
 CAMERA_RATE_HZ = 30.0
 IMU_RATE_HZ = 200.0

@@ -10,10 +10,10 @@ import pytest
 
 from evaluation.datasets.formats import FORMATS, robots_for
 from evaluation.datasets.simulated import Simulated
-from sim import recorder
-from sim.presets import NOMINAL
-from sim.recorder import record
+from sim.recording import recorder
+from sim.recording.recorder import record
 from sim.scene import parse_scene
+from sim.sensors.presets import NOMINAL
 from tests.sim.small_flight import SCENE
 
 FIRST_NS, IMAGES = 3_300_000_000, 21

@@ -10,12 +10,12 @@ from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
 from airground.core.surface import AerialSurface, DepthMap
 from airground.core.trajectory import Trajectory
-from evaluation.realtime.live_summary import STAGE
-from evaluation.report.published import TABLE_I
-from evaluation.results.condition import Condition
-from evaluation.results.row_writer import RowWriter
-from evaluation.results.table import ResultTable, Row
-from evaluation.showcase.showcase import LocalizationStep, Showcase
+from evaluation.judge.live_summary import STAGE
+from evaluation.measure.showcase.showcase import LocalizationStep, Showcase
+from evaluation.setup.condition import Condition
+from evaluation.setup.published import TABLE_I
+from evaluation.table.row_writer import RowWriter
+from evaluation.table.rows import ResultTable, Row
 
 BEST = Condition("best", "oracle exact", "nominal", "known")
 DRIFT = Condition("best", "oracle with drift", "nominal", "known")

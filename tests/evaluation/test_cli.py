@@ -13,8 +13,9 @@ from pathlib import Path
 import pytest
 
 from airground.errors import InputError, RecordingError
-from evaluation import cli, console
+from evaluation import cli
 from evaluation.commands.words import Verb, in_range
+from evaluation.setup import console
 
 RUN_CLI = "from evaluation.cli import main; main()"
 

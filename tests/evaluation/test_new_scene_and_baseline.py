@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evaluation.results.table import ResultTable
+from evaluation.table.rows import ResultTable
 from sim.scene import parse_scene
 
 ROOT = Path(__file__).parents[2]
@@ -49,7 +49,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copytree(ROOT / "evaluation", root / "evaluation")
     (root / "small.toml").write_text(SCENE, encoding="utf-8")
     (root / "evaluation/baselines/highest_heap.py").write_text(FUNCTION, encoding="utf-8")
-    table = root / "evaluation/baselines/table.py"
+    table = root / "evaluation/measure/baselines/table.py"
     table.write_text(with_line(table.read_text(encoding="utf-8")), encoding="utf-8")
     return root
 

@@ -6,9 +6,9 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.motion import Motion, simulate_motion
+from sim.robots.motion import Motion, simulate_motion
 from sim.scene import GroundPath, MavPath, Room, Scene
-from sim.world import World
+from sim.world.world.world import World
 
 STEP_S = 0.005
 MAV: dict[str, Any] = {

@@ -8,7 +8,7 @@ import open3d as o3d
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from sim.surface import box_mesh, join, rectangle_mesh
+from sim.geometry.surface import box_mesh, join, rectangle_mesh
 
 # Unequal focal lengths and a shifted principal point, so that no mix-up goes unseen.
 CAMERAS = {

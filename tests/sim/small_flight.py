@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from sim.recorder import image_stamps
+from sim.recording.recorder import image_stamps
 from sim.scene import Scene
-from sim.world import World, build_world
+from sim.world.world.world import World, build_world
 
 SCENE = """
 name = "small"

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from sim.robot_motion import GRAVITY_WORLD, RobotMotion
+from sim.robots.robot_motion import GRAVITY_WORLD, RobotMotion
 
 
 def integrate_imu(

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from airground.io.recording import Recording
-from sim import recorder
-from sim.presets import NONE
-from sim.recorder import record
+from sim.recording import recorder
+from sim.recording.recorder import record
+from sim.recording.truth import Truth
 from sim.scene import parse_scene
-from sim.truth import Truth
+from sim.sensors.presets import NONE
 from tests.sim.small_flight import SCENE, few_stamps, plain_world
 
 PAGE = Path(__file__).parents[2] / "docs" / "add_a_sensor.md"

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from airground.errors import InputError
-from sim.magnetic_field import EARTH_FIELD_WORLD
-from sim.motion import simulate_motion
-from sim.overlap import driven_path, overlap_along_flight
-from sim.presets import HARSH, NOMINAL, NONE, SensorPreset, with_heading_error, with_noise
-from sim.rubble import make_heap
+from sim.appearance.sheet import faded
+from sim.geometry.rubble import make_heap
+from sim.robots.motion import simulate_motion
+from sim.robots.overlap import driven_path, overlap_along_flight
 from sim.scene import Scene, load_scene
 from sim.sensors.magnetometer import measure_field
-from sim.sheet import faded
-from sim.world import World, build_world
+from sim.sensors.presets import HARSH, NOMINAL, NONE, SensorPreset, with_heading_error, with_noise
+from sim.world.world.magnetic_field import EARTH_FIELD_WORLD
+from sim.world.world.world import World, build_world
 
 TINY = load_scene("tiny")
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from airground.core.se3 import SE3
-from sim.edges import Edges, find_edges
+from sim.geometry.edges import Edges, find_edges
+from sim.geometry.surface import box_mesh, join, rectangle_mesh
+from sim.geometry.terrain import HeightField
 from sim.scene import load_scene
-from sim.surface import box_mesh, join, rectangle_mesh
-from sim.terrain import HeightField
-from sim.world import build_world
+from sim.world.world.world import build_world
 
 AT = SE3.from_rotation_vector((0.3, -0.5, 0.2), (1.0, 2.0, 3.0))
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from airground.core.se3 import SE3
-from sim.presets import HARSH, NOMINAL, NONE, SensorPreset
-from sim.robot_motion import Mounting
+from sim.robots.robot_motion import Mounting
 from sim.sensors.miscalibration import Calibrations, calibrate
+from sim.sensors.presets import HARSH, NOMINAL, NONE, SensorPreset
 
 MAV = Mounting(
     SE3.from_heading(0.5, (0.0, 0.01, 0.02)), SE3.from_rotation_vector((3, 0.2, 0), (0.1, 0, 0))

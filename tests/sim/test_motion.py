@@ -4,9 +4,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from airground.errors import InputError
-from sim.ground_robot import drive, mounting, plan_drive
-from sim.magnetic_field import EARTH_FIELD_WORLD, MagneticField, room_field
-from sim.motion import ROBOTS, STEP_NS, Motion
+from sim.robots.ground_robot import drive, mounting, plan_drive
+from sim.robots.motion import ROBOTS, STEP_NS, Motion
+from sim.world.world.magnetic_field import EARTH_FIELD_WORLD, MagneticField, room_field
 from tests.sim.flights import STEP_S, Floor, simulate, small_scene
 from tests.sim.strapdown import imu_state, integrate_imu
 

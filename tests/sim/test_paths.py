@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from airground.errors import InputError
-from sim.paths import (
+from sim.robots.paths import (
     SmoothCurve,
     heading_path,
     minimum_jerk,

@@ -4,10 +4,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from airground.errors import InputError
-from sim.flight import fly, plan_flight
-from sim.magnetic_field import room_field
-from sim.quadrotor import INERTIA, MASS_KG, MOUNTING, quadrotor_model
-from sim.robot_motion import ideal_imu
+from sim.robots.flight import fly, plan_flight
+from sim.robots.quadrotor import INERTIA, MASS_KG, MOUNTING, quadrotor_model
+from sim.robots.robot_motion import ideal_imu
+from sim.world.world.magnetic_field import room_field
 from tests.sim.flights import MAV, STEP_S, small_scene
 from tests.sim.strapdown import imu_state, integrate_imu
 

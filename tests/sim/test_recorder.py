@@ -12,13 +12,13 @@ from airground.errors import AirgroundError, InputError
 from airground.io.digests import path_digest
 from airground.io.recording import Recording
 from airground.io.tum import read_tum
-from sim import frame_pool, recorder
-from sim.frames import FrameMaker
-from sim.presets import NOMINAL, NONE, SensorPreset
-from sim.recorder import image_stamps, record
+from sim.recording import frame_pool, recorder
+from sim.recording.frames import FrameMaker
+from sim.recording.recorder import image_stamps, record
+from sim.recording.truth import Truth
 from sim.scene import parse_scene
-from sim.truth import Truth
-from sim.world import build_world
+from sim.sensors.presets import NOMINAL, NONE, SensorPreset
+from sim.world.world.world import build_world
 from tests.sim.small_flight import FRAMES, SCENE, few_stamps, plain_world
 
 

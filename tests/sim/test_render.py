@@ -8,7 +8,7 @@ import trimesh
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from sim.render import Renderer, with_cameras
+from sim.recording.render import Renderer, with_cameras
 from tests.sim.heap import CAMERAS, POSES, Heap, empty_spec, make_heap
 
 

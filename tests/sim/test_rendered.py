@@ -11,12 +11,12 @@ import pytest
 from airground.core.messages import Stamped
 from airground.errors import AirgroundError, InputError
 from airground.io.recording import Recording
-from sim import recorder
-from sim.presets import NOMINAL
-from sim.recorder import record
-from sim.rendered import Flight, rendered
+from sim.recording import recorder
+from sim.recording.recorder import record
+from sim.recording.rendered import Flight, rendered
+from sim.recording.truth import Truth
 from sim.scene import parse_scene
-from sim.truth import Truth
+from sim.sensors.presets import NOMINAL
 from tests.sim.small_flight import FRAMES, SCENE, few_stamps, plain_world
 
 FLIGHT = Flight(parse_scene(SCENE, "small.toml"), 3, 1, NOMINAL)

@@ -3,7 +3,7 @@
 import pytest
 
 from airground.errors import InputError
-from sim.overlap import measured_overlap
+from sim.robots.overlap import measured_overlap
 from sim.scene import load_scene, parse_scene, scene_names
 
 SHIPPED = ["flat", "indoor_a", "indoor_b", "indoor_c", "outdoor", "tiny"]

@@ -5,9 +5,9 @@ import pytest
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from sim.presets import HARSH, NOMINAL, ImageNoise
 from sim.sensors.camera import MAX_SAMPLES, ExposureDrift, ImageSensor, pixel_motion
 from sim.sensors.hashed_noise import gaussian, noise_key
+from sim.sensors.presets import HARSH, NOMINAL, ImageNoise
 
 CAMERA = PinholeCamera(80, 60, 70.0, 72.0, 39.0, 30.5)
 STILL = SE3.identity()

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from airground.core.camera import PinholeCamera
-from sim.presets import HARSH, NOMINAL, DepthNoise
 from sim.sensors.depth import (
     BASELINE_M,
     INFRARED_FOCAL_PX,
@@ -15,6 +14,7 @@ from sim.sensors.depth import (
     projector_shadow,
 )
 from sim.sensors.hashed_noise import gaussian, noise_key
+from sim.sensors.presets import HARSH, NOMINAL, DepthNoise
 
 CAMERA = PinholeCamera(320, 240, 262.5, 262.5, 159.5, 119.5)
 NOISE = NOMINAL.depth

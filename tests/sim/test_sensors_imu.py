@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from airground.core.messages import ImuSamples
-from sim.presets import HARSH, NOMINAL
 from sim.sensors.imu import faults, measure_imu
 from sim.sensors.magnetometer import measure_field
+from sim.sensors.presets import HARSH, NOMINAL
 
 RATE_HZ = 200.0
 
@@ -59,7 +59,7 @@ def test_harsh_is_three_times_nominal() -> None:
 
 
 EARTH = np.array([21.5e-6, 0.0, -43.0e-6])
-ANOMALY_T = 0.8e-6 / np.sqrt(2)  # per horizontal axis, as sim.magnetic_field makes it
+ANOMALY_T = 0.8e-6 / np.sqrt(2)  # per horizontal axis, as sim.world.magnetic_field makes it
 
 
 def heading_errors(preset, trials: int = 300) -> np.ndarray:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sim.sheet import light_up
+from sim.appearance.sheet import light_up
 
 
 def at(image: np.ndarray, y: float, x: float) -> np.ndarray:

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from sim.edges import Edges, find_edges
-from sim.render import Renderer, with_cameras
-from sim.smooth_edges import share_beyond, smooth_edges
+from sim.geometry.edges import Edges, find_edges
+from sim.recording.render import Renderer, with_cameras
+from sim.recording.smooth_edges import share_beyond, smooth_edges
 from tests.sim.heap import CAMERAS, POSES, make_heap
 
 CAMERA = PinholeCamera(40, 30, 100.0, 100.0, 19.5, 14.5)

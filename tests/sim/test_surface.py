@@ -4,10 +4,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from sim.ray_caster import RayCaster
+from sim.geometry.ray_caster import RayCaster
+from sim.geometry.surface import BOX_CORNERS, BOX_TRIANGLES, join, rectangle_mesh
 from sim.scene import load_scene
-from sim.surface import BOX_CORNERS, BOX_TRIANGLES, join, rectangle_mesh
-from sim.world import World, build_world
+from sim.world.world.world import World, build_world
 
 
 @pytest.fixture(scope="module", params=["tiny", "outdoor", "flat"])

@@ -6,11 +6,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from airground.core.se3 import SE3
-from sim.bake_light import LightBaker
-from sim.pictures import CUBE_FACES, add_picture
+from sim.appearance.bake_light import LightBaker
+from sim.appearance.pictures import CUBE_FACES, add_picture
+from sim.geometry.surface import box_mesh, join, rectangle_mesh
 from sim.scene import Light, Scene, load_scene
-from sim.surface import box_mesh, join, rectangle_mesh
-from sim.world import World, build_world
+from sim.world.world.world import World, build_world
 
 
 def small(name: str = "tiny", **changes: object) -> Scene:

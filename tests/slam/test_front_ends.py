@@ -19,8 +19,8 @@ from airground.errors import InputError
 from airground.slam import front_ends
 from airground.slam.front_end import FrontEnd, TrackedPose, Tracking
 from airground.slam.front_ends import Ingredients, make_front_end
-from evaluation.truth.oracle import Oracle
-from evaluation.truth.pose_noise import EXACT
+from evaluation.setup.setups import EXACT
+from evaluation.table.oracle import Oracle
 from tests.slam.synthetic_world import Sequence, ground_sequence, mav_sequence
 
 MAX_SPEED_MPS = 1.5

@@ -10,13 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from airground.core.messages import GroundImage
-from tests.slam.synthetic_world import (
-    CAMERA,
-    GRAVITY,
-    Sequence,
-    ground_sequence,
-    mav_sequence,
-)
+from tests.slam.synthetic_world import CAMERA, GRAVITY, Sequence, ground_sequence, mav_sequence
 
 SEQUENCES = {"mav": mav_sequence, "ground": ground_sequence}
 

@@ -10,7 +10,7 @@ import pytest
 
 from airground.errors import AirgroundError
 from evaluation.bench.lane_process import lane_processes
-from evaluation.environment import usable_cores
+from evaluation.setup.environment import usable_cores
 
 
 def cores_and_threads() -> tuple[int, str]:

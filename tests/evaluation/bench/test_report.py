@@ -34,7 +34,7 @@ from evaluation.bench.report import (
 )
 from evaluation.bench.sampler import Sample
 from evaluation.bench.table import body, header, markdown, print_table
-from evaluation.realtime.live_summary import live_summary
+from evaluation.judge.live_summary import live_summary
 from tests.evaluation.synthetic_results import live_rows
 
 

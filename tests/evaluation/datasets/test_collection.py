@@ -21,10 +21,10 @@ from evaluation import cli
 from evaluation.datasets import collection
 from evaluation.datasets.collection import make_dataset
 from evaluation.datasets.plan import Plan, parse_seeds, parse_split, plan_dataset
-from evaluation.units.crew import Crew
-from sim.presets import NOMINAL
-from sim.recorder import record
+from evaluation.measure.work.crew import Crew
+from sim.recording.recorder import record
 from sim.scene import load_scene
+from sim.sensors.presets import NOMINAL
 from tests.sim.small_flight import SCENE
 
 

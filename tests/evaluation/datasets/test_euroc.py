@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from airground.io.euroc import read_imu
 from airground.io.sensor_file import read_mapping
 from evaluation.datasets.simulated import Simulated
-from evaluation.truth.camera import read_euroc_poses
+from evaluation.table.true_camera import read_euroc_poses
 
 OFFICIAL = {
     "body.yaml",

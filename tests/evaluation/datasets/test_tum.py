@@ -16,7 +16,7 @@ from airground.core.se3 import SE3
 from airground.io.open_robot import open_robot
 from airground.io.tum import read_tum
 from evaluation.datasets.simulated import Simulated
-from evaluation.truth.camera import true_camera
+from evaluation.table.true_camera import true_camera
 
 Exported = Callable[[str], Path]
 APART = 10

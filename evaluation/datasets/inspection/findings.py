@@ -1,0 +1,117 @@
+"""Findings of an inspection, and how regularly a sensor speaks."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import Console
+from rich.table import Table
+
+
+class Verdict(StrEnum):
+    """What a finding means."""
+
+    FINE = "ok"
+    NOTED = "note"
+    WRONG = "wrong"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the table.
+
+    Attributes:
+        part: Of the dataset: "mav", "ground", or "" for all of it.
+        subject: What was looked at.
+        found: In words and numbers.
+        verdict: What that means.
+    """
+
+    part: str
+    subject: str
+    found: str
+    verdict: Verdict = Verdict.FINE
+
+
+def show(title: str, findings: Sequence[Finding], console: Console | None = None) -> None:
+    """Print findings as a table."""
+    colours = {Verdict.FINE: "green", Verdict.NOTED: "yellow", Verdict.WRONG: "bold red"}
+    shown = Table(title=title, title_justify="left")
+    for header in ("", "what", "found", ""):
+        shown.add_column(header)
+    for one in findings:
+        colour = colours[one.verdict]
+        shown.add_row(one.part, one.subject, one.found, f"[{colour}]{one.verdict}[/]")
+    (console or Console()).print(shown)
+
+
+def as_json(dataset: str, layout: str, findings: Sequence[Finding]) -> str:
+    """The same for programs."""
+    content = {
+        "schema": "airground-inspection",
+        "version": 1,
+        "dataset": dataset,
+        "layout": layout,
+        "wrong": sum(one.verdict is Verdict.WRONG for one in findings),
+        "findings": [asdict(one) for one in findings],
+    }
+    return json.dumps(content, indent=2)
+
+
+MISSED = 1.5
+"""A step this many times the usual one leaves something out."""
+LONGEST_GAP_S = {"images": 0.5, "IMU": 0.05, "magnetometer": 0.5, "true poses": 0.5}
+"""Over longer gaps nobody can tell what happened."""
+
+
+@dataclass(frozen=True)
+class Rhythm:
+    """Of one stream of stamps.
+
+    Attributes:
+        count: How many there are.
+        rate_hz: By the median step.
+        missing: How many more there would be at that rate.
+        longest_gap_s: The longest step.
+        jitter_ms: Standard deviation of the steps that leave nothing out.
+    """
+
+    count: int
+    rate_hz: float
+    missing: int
+    longest_gap_s: float
+    jitter_ms: float
+
+    @classmethod
+    def of(cls, stamps_ns: NDArray[np.int64]) -> Rhythm:
+        """From at least two stamps [ns]."""
+        steps_s = np.diff(stamps_ns) / 1e9
+        usual = float(np.median(steps_s))
+        whole = steps_s < MISSED * usual
+        left_out = np.rint(steps_s[~whole] / usual) - 1
+        return cls(
+            len(stamps_ns),
+            1 / usual,
+            int(left_out.sum()),
+            float(steps_s.max()),
+            float(1e3 * steps_s[whole].std()),
+        )
+
+
+def look_at_stamps(part: str, subject: str, stamps_ns: NDArray[np.int64]) -> Finding:
+    """Rate and gaps of one of the streams that `LONGEST_GAP_S` names."""
+    if len(stamps_ns) < 2:
+        return Finding(part, subject, f"{len(stamps_ns)}: too few for a rate", Verdict.WRONG)
+    rhythm = Rhythm.of(stamps_ns)
+    found = f"{rhythm.count} at {rhythm.rate_hz:.1f} Hz, jitter {rhythm.jitter_ms:.2f} ms"
+    verdict = Verdict.FINE
+    if rhythm.missing:
+        found += f", {rhythm.missing} missing, longest gap {rhythm.longest_gap_s:.3g} s"
+        too_long = rhythm.longest_gap_s > LONGEST_GAP_S[subject]
+        verdict = Verdict.WRONG if too_long else Verdict.NOTED
+    return Finding(part, subject, found, verdict)

@@ -1,0 +1,255 @@
+"""What localization and refinement claim, who is wrong, and whether the spread says so."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.stats import chi2, spearmanr
+
+from evaluation.judge import samples
+from evaluation.measure.protocol.negatives import CASES, Case
+from evaluation.setup.checked_json import Count, Number, Part, Share, number
+from evaluation.table.intervals import Rate, wilson
+from evaluation.table.rows import CONTROL_SCENES, SEQUENCE_KEYS, ResultTable
+
+TO_BE_FOUND = "found"
+"""The case in which there is something to find."""
+NO_STRUCTURE = "no_structure"
+"""The case of the control scenes."""
+ALL = "all"
+
+
+@dataclass(frozen=True)
+class Claims:
+    """What was claimed in one case.
+
+    Attributes:
+        accepted: Of all that were asked.
+        wrong: Of those accepted.
+    """
+
+    accepted: Rate
+    wrong: Rate
+
+    @classmethod
+    def of(cls, claimed: pd.Series, wrong: pd.Series) -> Claims:
+        """Count claims, and those among them that are wrong (1 or 0 each, the same index)."""
+        accepted, false = int((claimed > 0).sum()), int((wrong > 0).sum())
+        return cls(wilson(accepted, len(claimed)), wilson(false, accepted))
+
+    @classmethod
+    def sum(cls, parts: list[Claims]) -> Claims:
+        """All cases together."""
+        asked = sum(part.accepted.total for part in parts)
+        accepted = sum(part.accepted.successes for part in parts)
+        false = sum(part.wrong.successes for part in parts)
+        return cls(wilson(accepted, asked), wilson(false, accepted))
+
+
+def localization_claims(table: ResultTable) -> dict[str, Claims]:
+    """Claims of a position by case, `ALL` last (of one condition); one entry an aerial map.
+
+    Where there is something to find, a claim farther off than 0.25 m in the horizontal plane
+    is wrong; elsewhere every one is.
+    """
+    return _by_case(table, samples.claimed, samples.claimed_wrongly, "converged")
+
+
+def refinement_claims(table: ResultTable) -> dict[str, Claims]:
+    """Accepted refinements by case, `ALL` last (of one condition); one entry a trial.
+
+    Where there is something to find, one farther off than 5 cm or 2 degrees is wrong; elsewhere
+    every one is.
+    """
+    return _by_case(table, samples.refined("accepted"), samples.refined_wrongly, "accepted")
+
+
+def _by_case(
+    table: ResultTable,
+    claimed: Callable[[ResultTable], pd.Series],
+    wrong: Callable[[ResultTable], pd.Series],
+    metric: str,
+) -> dict[str, Claims]:
+    """Cases in which nothing was asked are left out, and `ALL` without any case."""
+    controls = [scene for scene in table.scenes() if scene in CONTROL_SCENES]
+    places = table.of_scenes(scene for scene in table.scenes() if scene not in CONTROL_SCENES)
+    flat = claimed(table.of_scenes(controls))
+    made = {
+        TO_BE_FOUND: Claims.of(claimed(places), wrong(places)),
+        NO_STRUCTURE: Claims.of(flat, flat),
+        **{case.stage: _negative(table, case, metric) for case in CASES},
+    }
+    asked = {name: claims for name, claims in made.items() if claims.accepted.total}
+    return asked | {ALL: Claims.sum(list(asked.values()))} if asked else {}
+
+
+def _negative(table: ResultTable, case: Case, metric: str) -> Claims:
+    claimed = table.rows(case.stage, metric)["value"]
+    return Claims.of(claimed, claimed)
+
+
+METRIC = "squared_mahalanobis"
+"""Of the stage "localization"."""
+ELLIPSES = (0.50, 0.90, 0.99)
+"""Shares of a Gaussian that lie in the ellipses that are looked at."""
+FREEDOM = 2
+"""Degrees of freedom of a horizontal position."""
+
+
+@dataclass(frozen=True)
+class Localizations:
+    """All that localization said of its own errors, one entry an aerial map.
+
+    Attributes:
+        error_m, spread_m: (N,) horizontal error and the particles' standard deviation [m].
+        squared_mahalanobis: (N,) of the true position in the particles' covariance.
+        accepted: (N,) whether a position was claimed.
+    """
+
+    error_m: NDArray[np.float64]
+    spread_m: NDArray[np.float64]
+    squared_mahalanobis: NDArray[np.float64]
+    accepted: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return len(self.accepted)
+
+    def only_accepted(self) -> Localizations:
+        """Those that claim a position."""
+        kept = self.accepted
+        return Localizations(
+            self.error_m[kept], self.spread_m[kept], self.squared_mahalanobis[kept], kept[kept]
+        )
+
+    def coverage(self, share: float) -> Rate:
+        """How often the truth lies in the ellipse that holds this share of a Gaussian."""
+        inside = self.squared_mahalanobis <= chi2.ppf(share, FREEDOM)
+        return wilson(int(inside.sum()), len(self))
+
+    def mean_normalized_error(self) -> float:
+        """Mean NEES over its degrees of freedom: 1 is right, above is too sure; NaN for none."""
+        return float(self.squared_mahalanobis.mean() / FREEDOM) if len(self) else float("nan")
+
+    def median_normalized_error(self) -> float:
+        """Median NEES over a Gaussian's: 1 is right, and outliers do not matter; NaN for none."""
+        if len(self) == 0:
+            return float("nan")
+        return float(np.median(self.squared_mahalanobis) / chi2.ppf(0.5, FREEDOM))
+
+    def rank_correlation(self) -> float:
+        """Spearman's, of spread and error: 1 where a larger spread always means a larger error.
+
+        NaN for fewer than three localizations, or where one of both never changes.
+        """
+        if len(self) < 3 or np.ptp(self.error_m) == 0 or np.ptp(self.spread_m) == 0:
+            return float("nan")
+        return float(spearmanr(self.spread_m, self.error_m).statistic)
+
+
+def localizations(table: ResultTable) -> Localizations:
+    """All beliefs of a table; aerial maps that never came gave none."""
+    keys = [*SEQUENCE_KEYS, "iteration"]
+    metrics = ["error_m", "spread_m", METRIC, "converged"]
+    frame = table.frame[
+        (table.frame["stage"] == "localization") & table.frame["metric"].isin(metrics)
+    ]
+    wide = frame.pivot(index=keys, columns="metric", values="value").reindex(columns=metrics)
+    believed = wide[wide[METRIC].notna()]
+    error_m, spread_m, distance, converged = (_column(believed, name) for name in metrics)
+    return Localizations(error_m, spread_m, distance, converged > 0)
+
+
+def _column(frame: pd.DataFrame, name: str) -> NDArray[np.float64]:
+    return frame[name].to_numpy(np.float64)
+
+
+class ShareOf(Part):
+    """A share with its 95 % Wilson interval; null without any case."""
+
+    count: Count
+    total: Count
+    share: Share | None
+    low: Share
+    high: Share
+
+    @classmethod
+    def of(cls, rate: Rate) -> ShareOf:
+        share = rate.share if rate.total else None
+        return cls(
+            count=rate.successes, total=rate.total, share=share, low=rate.low, high=rate.high
+        )
+
+
+class ClaimsPart(Part):
+    """Of all that were asked, those accepted; of those, the wrong ones."""
+
+    accepted: ShareOf
+    wrong: ShareOf
+
+    @classmethod
+    def of(cls, claims: Claims) -> ClaimsPart:
+        return cls(accepted=ShareOf.of(claims.accepted), wrong=ShareOf.of(claims.wrong))
+
+
+class ClaimsSummary(Part):
+    """By case: "found", "no_structure", "no_overlap", "wrong_map", and "all" of them."""
+
+    localization: dict[str, ClaimsPart]
+    refinement: dict[str, ClaimsPart]
+
+
+class CalibrationPart(Part):
+    """Of some localizations: 1 is right for both normalized errors, above is too sure."""
+
+    localizations: Count
+    normalized_error_mean: Number
+    normalized_error_median: Number
+    rank_correlation: Number
+    within_50: ShareOf
+    within_90: ShareOf
+    within_99: ShareOf
+
+    @classmethod
+    def of(cls, found: Localizations) -> CalibrationPart:
+        half, most, nearly_all = (ShareOf.of(found.coverage(share)) for share in ELLIPSES)
+        return cls(
+            localizations=len(found),
+            normalized_error_mean=number(found.mean_normalized_error()),
+            normalized_error_median=number(found.median_normalized_error()),
+            rank_correlation=number(found.rank_correlation()),
+            within_50=half,
+            within_90=most,
+            within_99=nearly_all,
+        )
+
+
+class CalibrationSummary(Part):
+    """All beliefs, and those that claim a position."""
+
+    all: CalibrationPart
+    accepted: CalibrationPart
+
+
+def claims_summary(table: ResultTable) -> ClaimsSummary:
+    """Of one condition, control scenes and negative cases included."""
+
+    def parts(claims: dict[str, Claims]) -> dict[str, ClaimsPart]:
+        return {case: ClaimsPart.of(made) for case, made in claims.items()}
+
+    return ClaimsSummary(
+        localization=parts(localization_claims(table)), refinement=parts(refinement_claims(table))
+    )
+
+
+def calibration_summary(table: ResultTable) -> CalibrationSummary | None:
+    """Of one condition, control scenes apart; None where no belief was measured."""
+    found = localizations(table)
+    if len(found) == 0:
+        return None
+    return CalibrationSummary(
+        all=CalibrationPart.of(found), accepted=CalibrationPart.of(found.only_accepted())
+    )

@@ -1,0 +1,88 @@
+"""What one run measured of the watched metrics, ready to be held against another's."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+
+from airground.errors import InputError
+from evaluation.judge.metrics import WATCHED, Metric
+from evaluation.judge.samples import Flight, Samples, flights
+from evaluation.setup.condition import Condition
+from evaluation.table.comparison import median
+from evaluation.table.rows import ResultTable
+
+
+@dataclass(frozen=True)
+class Measured:
+    """The watched metrics of one condition.
+
+    Attributes:
+        suite: Which scenes, and how many flights over each.
+        condition: Under what.
+        flights: All of them, sorted.
+        samples: By the metric's name, then by flight.
+    """
+
+    suite: str
+    condition: Condition
+    flights: list[Flight]
+    samples: dict[str, Samples]
+
+    @classmethod
+    def of(cls, table: ResultTable, condition: Condition | None = None) -> Measured:
+        """What a table says under one condition; None for its first.
+
+        Raises:
+            InputError: Nothing was measured under the condition.
+        """
+        if len(table) == 0:
+            raise InputError("results: the table is empty")
+        chosen = condition or table.conditions()[0]
+        part = table.of(chosen)
+        if len(part) == 0:
+            known = "; ".join(other.label() for other in table.conditions())
+            raise InputError(f"results: nothing was measured with {chosen.label()}; only: {known}")
+        everyone = flights(part)
+        samples = {metric.name: metric.samples(part) for metric in WATCHED}
+        return cls(suite_of(everyone), chosen, everyone, samples)
+
+    def only(self, kept: set[Flight]) -> Measured:
+        """Without the other flights."""
+        remaining = [flight for flight in self.flights if flight in kept]
+        samples = {
+            name: {flight: values for flight, values in by_flight.items() if flight in kept}
+            for name, by_flight in self.samples.items()
+        }
+        return Measured(suite_of(remaining), self.condition, remaining, samples)
+
+
+def suite_of(everyone: list[Flight]) -> str:
+    """In words: the scenes and how many flights over each."""
+    counts = Counter(flight.scene for flight in everyone)
+    return ", ".join(f"{scene} x {count}" for scene, count in sorted(counts.items()))
+
+
+def figure(metric: Metric, samples: Samples) -> float:
+    """The one number told of a metric: each flight's median (or share), and their middle.
+
+    NaN where nothing was measured.
+    """
+    per_flight = [flight_value(metric, values) for values in samples.values() if values]
+    if not per_flight:
+        return float("nan")
+    return float(np.mean(per_flight)) if metric.share else median(np.array(per_flight))
+
+
+def flight_value(metric: Metric, values: list[float]) -> float:
+    """A flight as one observation; one without any value failed."""
+    if not values:
+        return metric.failure
+    return float(np.mean(values)) if metric.share else median(np.array(values))
+
+
+def headline(measured: Measured) -> dict[str, float]:
+    """The figure of every metric."""
+    return {metric.name: figure(metric, measured.samples[metric.name]) for metric in WATCHED}

@@ -1,0 +1,77 @@
+"""The files that a run leaves, written and read back, and where results come from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from airground.config import Config
+from airground.errors import InputError
+from evaluation.judge.summary import Summary
+from evaluation.measure.showcase.showcase import Showcase
+from evaluation.setup.settings import resolve
+from evaluation.table.rows import ResultTable
+
+TABLE, SUMMARY, CONFIG, SHOWCASE = "results.parquet", "summary.json", "config.toml", "showcase"
+
+
+@dataclass(frozen=True)
+class Results:
+    """Everything that was measured, and how.
+
+    Attributes:
+        table: The measurements; the first condition in it is the primary one.
+        config: The primary setup's parameters, as resolved.
+        seed: Of all that was random.
+        showcase: What pictures are drawn from, where it was gathered.
+        notes: What the reader of a report should know.
+    """
+
+    table: ResultTable
+    config: Config
+    seed: int
+    showcase: Showcase | None = None
+    notes: Sequence[str] = ()
+
+
+def read_results(folder: Path) -> Results:
+    """Read what `Results.write` wrote.
+
+    Raises:
+        InputError: A file is missing or damaged; names it.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder; expected what run or reproduce wrote")
+    summary = Summary.read(folder / SUMMARY)
+    showcase = folder / SHOWCASE
+    return Results(
+        table=ResultTable.read(folder / TABLE),
+        config=resolve(file=folder / CONFIG),
+        seed=summary.seed,
+        showcase=Showcase.load(showcase) if showcase.is_dir() else None,
+    )
+
+
+def read_table(folder: Path) -> ResultTable:
+    """Read only the measurements of what `Results.write` wrote.
+
+    Raises:
+        InputError: The folder or its table is missing or damaged; names it.
+    """
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder; expected what run or reproduce wrote")
+    return ResultTable.read(folder / TABLE)
+
+
+def merged(parts: Sequence[Results]) -> Results:
+    """Several results as one; the first gives the primary condition and the pictures."""
+    first = parts[0]
+    showcases = [part.showcase for part in parts if part.showcase is not None]
+    return Results(
+        table=ResultTable.concat([part.table for part in parts]),
+        config=first.config,
+        seed=first.seed,
+        showcase=showcases[0] if showcases else None,
+        notes=[f"Put together from {len(parts)} runs."] if len(parts) > 1 else [],
+    )

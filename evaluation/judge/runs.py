@@ -1,0 +1,167 @@
+"""The runs of a comparison: read back, named, and paired flight by flight."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from airground.config import Config
+from airground.errors import InputError
+from evaluation.judge.measured import Measured
+from evaluation.judge.results import SUMMARY, read_results
+from evaluation.judge.samples import Flight
+from evaluation.judge.summary import Summary
+from evaluation.judge.verdict import Comparison, Verdict, compare
+from evaluation.table.rows import SEQUENCE_KEYS, ResultTable
+
+MOST_RUNS = 4
+"""More would not be told apart in a figure."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What one run left, of its primary condition.
+
+    Attributes:
+        name: What readers call it.
+        table: Its rows, control scenes included.
+        config: Its parameters, as resolved.
+        summary: Where it comes from, among others.
+        measured: Its watched metrics.
+    """
+
+    name: str
+    table: ResultTable
+    config: Config
+    summary: Summary
+    measured: Measured
+
+    @classmethod
+    def read(cls, folder: Path, name: str) -> Run:
+        """Raises InputError where a file is missing or damaged."""
+        results = read_results(folder)
+        measured = Measured.of(results.table)
+        table = results.table.of(measured.condition)
+        return cls(name, table, results.config, Summary.read(folder / SUMMARY), measured)
+
+    def on(self, flights: set[Flight]) -> ResultTable:
+        """Its rows of some flights, control scenes apart."""
+        keys = list(self.table.frame[SEQUENCE_KEYS[:3]].itertuples(index=False, name=None))
+        kept = [
+            Flight(str(scene), int(seed), int(flight)) in flights for scene, seed, flight in keys
+        ]
+        return ResultTable(self.table.frame[kept]).without_controls()
+
+
+@dataclass(frozen=True)
+class Against:
+    """A run held against the reference.
+
+    Attributes:
+        reference, run: Both sides.
+        comparison: Metric by metric.
+        shared: The flights that both have; empty where none is, and samples were compared.
+        left_out: How many flights only one side has, where others are shared.
+    """
+
+    reference: Run
+    run: Run
+    comparison: Comparison
+    shared: set[Flight]
+    left_out: int
+
+    def caveats(self) -> list[str]:
+        """What a reader should know before believing the verdicts."""
+        made = []
+        if not self.shared:
+            made.append(
+                "No flight is the same in both runs: they are compared as two samples, which "
+                "sees less than pairs do, and takes the flights as drawn alike."
+            )
+        if self.left_out:
+            made.append(
+                f"Compared over the {len(self.shared)} flights that both have; {self.left_out} "
+                "that only one has are left out."
+            )
+        for what, stage, key in (
+            ("sequences", "localization", "sequence"),
+            ("refinement trials", "refinement", "trial"),
+        ):
+            before, after = (_most(run.table, stage, key) for run in (self.reference, self.run))
+            if self.shared and before != after:
+                made.append(
+                    f"Up to {after} {what} a flight against {before}: what only one has counts as "
+                    "failed on the other."
+                )
+        if self.reference.measured.condition != self.run.measured.condition:
+            made.append(
+                f"Other conditions: {self.run.measured.condition.label()}, against "
+                f"{self.reference.measured.condition.label()}."
+            )
+        return made
+
+    def outcome(self) -> str:
+        """How many metrics moved which way, in a few words."""
+        counts = [
+            f"{len(self.comparison.of(verdict))} {verdict}"
+            for verdict in Verdict
+            if verdict not in (Verdict.SAME, Verdict.UNMEASURED) and self.comparison.of(verdict)
+        ]
+        return ", ".join(counts) or str(Verdict.SAME)
+
+
+def read_runs(folders: Sequence[Path]) -> list[Run]:
+    """All of them, the first is the reference.
+
+    Raises:
+        InputError: Too few or too many, one twice, or one that cannot be read.
+    """
+    if not 2 <= len(folders) <= MOST_RUNS:
+        raise InputError(
+            f"{len(folders)} given; expected 2 to {MOST_RUNS} folders that run or reproduce wrote"
+        )
+    twice = [path for path, count in Counter(p.resolve() for p in folders).items() if count > 1]
+    if twice:
+        raise InputError(f"{twice[0]}: given twice; a run does not differ from itself")
+    names = distinct_names(folders)
+    return [Run.read(folder, name) for folder, name in zip(folders, names, strict=True)]
+
+
+def against(reference: Run, run: Run) -> Against:
+    """Hold a run against the reference, over the flights that both have.
+
+    Where they share none, all flights of both are compared as two samples.
+
+    Raises:
+        InputError: No flight is shared, and the scenes or numbers of flights differ too.
+    """
+    before, after = reference.measured, run.measured
+    shared = set(before.flights) & set(after.flights)
+    left_out = 0
+    if shared:
+        left_out = len(set(before.flights) ^ set(after.flights))
+        before, after = before.only(shared), after.only(shared)
+    elif before.suite != after.suite:
+        raise InputError(
+            f"{run.name}: has no flight of {reference.name} (scene, seed and flight), and measured "
+            f"{after.suite} instead of {before.suite}; compare runs over the same scenes"
+        )
+    return Against(reference, run, compare(before, after), shared, left_out)
+
+
+def distinct_names(folders: Sequence[Path]) -> list[str]:
+    """The folders' names, with as many of their parents' as tell them apart."""
+    parts = [folder.resolve().parts for folder in folders]
+    depth = 1
+    while len({part[-depth:] for part in parts}) < len(parts):
+        depth += 1
+    return ["/".join(part[-depth:]) for part in parts]
+
+
+def _most(table: ResultTable, stage: str, key: str) -> int:
+    """How many sequences, or trials, the flight with the most of them has."""
+    rows = table.frame[table.frame["stage"] == stage]
+    counts = rows.groupby(SEQUENCE_KEYS[:3])[key].nunique()
+    return int(counts.max()) if len(counts) else 0

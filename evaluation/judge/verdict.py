@@ -1,0 +1,202 @@
+"""The verdict on each watched metric: better, worse, moved a little, or no difference seen.
+
+Both sides must be of one suite. The same flights on both sides are paired, and so are their
+trials one by one; entirely different flights are two samples. Better or worse needs two
+things: the change is consistent beyond chance, after Holm's correction for all metrics
+together, and it is at least as large as matters. What is beyond chance but smaller has moved;
+it is shown, and fails nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import zip_longest
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.errors import InputError
+from evaluation.judge.measured import Measured, figure, flight_value
+from evaluation.judge.metrics import WATCHED, Metric
+from evaluation.judge.samples import Samples
+from evaluation.setup.condition import Condition
+from evaluation.table.comparison import (
+    Effect,
+    adjusted,
+    least_paired_p,
+    least_two_sample_p,
+    median,
+    paired_effect,
+    subtract,
+    two_sample_effect,
+)
+
+ALPHA = 0.05
+"""How often a check of an unchanged program may call any metric better or worse."""
+
+
+class Verdict(StrEnum):
+    BETTER = "better"
+    WORSE = "worse"
+    SLIGHTLY_BETTER = "slightly better"
+    SLIGHTLY_WORSE = "slightly worse"
+    SAME = "no difference seen"
+    UNMEASURED = "not measured"
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What is told of one metric before all are judged together.
+
+    Attributes:
+        effect: What changed.
+        count: How many observations were compared; of two samples, the fewer.
+        by_flight: Whether a flight is one observation. Else its trials are, taken as
+            independent, which they are not quite.
+    """
+
+    effect: Effect
+    count: int
+    by_flight: bool
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One metric.
+
+    Attributes:
+        metric: Which.
+        before, after: Its figure on both sides; NaN where nothing was measured.
+        compared: What changed, None where nothing was measured.
+        p: Of no change, adjusted for all metrics; NaN where nothing was measured.
+        matters: The smallest effect that does, in the metric's unit.
+        verdict: What follows.
+    """
+
+    metric: Metric
+    before: float
+    after: float
+    compared: Compared | None
+    p: float
+    matters: float
+    verdict: Verdict
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All metrics.
+
+    Attributes:
+        suite: The scenes, and how many flights over each.
+        condition: Under what `before` was measured.
+        paired: Whether both sides flew the same flights.
+        judged: In the order of `WATCHED`.
+    """
+
+    suite: str
+    condition: Condition
+    paired: bool
+    judged: list[Judged]
+
+    def of(self, verdict: Verdict) -> list[Judged]:
+        return [one for one in self.judged if one.verdict == verdict]
+
+
+def compare(before: Measured, after: Measured) -> Comparison:
+    """Judge every watched metric.
+
+    Raises:
+        InputError: Suites differ, or only some flights are the same.
+    """
+    paired = _paired(before, after)
+    compared = [
+        _compared(metric, before.samples[metric.name], after.samples[metric.name], paired)
+        for metric in WATCHED
+    ]
+    p_values = iter(adjusted([one.effect.p for one in compared if one is not None]))
+    judged = []
+    for metric, one in zip(WATCHED, compared, strict=True):
+        old, new = (figure(metric, side.samples[metric.name]) for side in (before, after))
+        matters = metric.matters
+        if metric.relative:
+            matters *= abs(old) if np.isfinite(old) else 0.0
+        p = float("nan") if one is None else next(p_values)
+        verdict = Verdict.UNMEASURED if one is None else _verdict(metric, one.effect, p, matters)
+        judged.append(Judged(metric, old, new, one, p, matters, verdict))
+    return Comparison(before.suite, before.condition, paired, judged)
+
+
+def _paired(before: Measured, after: Measured) -> bool:
+    """Whether both flew the same flights; refuses what cannot be compared."""
+    if before.suite != after.suite:
+        raise InputError(f"measured over {after.suite}; expected {before.suite}")
+    shared = len(set(before.flights) & set(after.flights))
+    if shared not in (0, len(before.flights)):
+        raise InputError(
+            f"{shared} of {len(before.flights)} flights are the same on both sides; expected "
+            "all of them (the same seeds) or none (new seeds)"
+        )
+    return shared > 0
+
+
+def _compared(metric: Metric, before: Samples, after: Samples, paired: bool) -> Compared | None:
+    """What changed in one metric; None where neither side measured anything."""
+    if not any(before.values()) and not any(after.values()):
+        return None
+    if paired:
+        differences, by_flight = paired_differences(metric, before, after)
+        effect = paired_effect(differences, metric.share)
+        return Compared(effect, len(differences), by_flight)
+    return _compared_samples(metric, before, after)
+
+
+def paired_differences(
+    metric: Metric, before: Samples, after: Samples
+) -> tuple[NDArray[np.float64], bool]:
+    """(N,) after minus before, and whether each is one flight's; else each is one trial's.
+
+    Trials are paired in their order; one that only one side has failed on the other. Some
+    flight must have a value.
+    """
+    flights = []
+    for flight in sorted(before.keys() | after.keys()):
+        pairs = list(
+            zip_longest(before.get(flight, []), after.get(flight, []), fillvalue=metric.failure)
+        )
+        if pairs:
+            old, new = np.array(pairs).T
+            flights.append(subtract(new, old))
+    by_flight = _reaches(least_paired_p(len(flights)))
+    if by_flight:
+        middle = [float(d.mean()) if metric.share else median(d) for d in flights]
+        return np.array(middle), True
+    return np.concatenate(flights), False
+
+
+def _compared_samples(metric: Metric, before: Samples, after: Samples) -> Compared:
+    by_flight = _reaches(least_two_sample_p(len(before), len(after)))
+    old, new = (_observations(metric, side, by_flight) for side in (before, after))
+    effect = two_sample_effect(old, new, metric.share)
+    return Compared(effect, min(len(old), len(new)), by_flight)
+
+
+def _observations(metric: Metric, samples: Samples, by_flight: bool) -> NDArray[np.float64]:
+    if by_flight:
+        return np.array([flight_value(metric, values) for values in samples.values()])
+    # A flight without a value failed as a whole.
+    return np.concatenate([np.array(values or [metric.failure]) for values in samples.values()])
+
+
+def _reaches(least_p: float) -> bool:
+    """Whether so few observations could ever say anything, with all metrics watched."""
+    return least_p * len(WATCHED) <= ALPHA
+
+
+def _verdict(metric: Metric, effect: Effect, p: float, matters: float) -> Verdict:
+    if p > ALPHA or effect.value == 0:
+        return Verdict.SAME
+    improved = (effect.value < 0) == (metric.better == "lower")
+    if abs(effect.value) < matters:
+        return Verdict.SLIGHTLY_BETTER if improved else Verdict.SLIGHTLY_WORSE
+    return Verdict.BETTER if improved else Verdict.WORSE

@@ -1,0 +1,1 @@
+"""Many recordings measured: protocol, baselines, sweeps, and the work spread over processes."""

@@ -1,0 +1,215 @@
+"""Baselines by appearance: SIFT and ASIFT matches, and the camera pose by PnP."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from airground.core.se3 import SE3, nearest_rotation
+from evaluation.measure.baselines.interface import Answer, Given, View
+
+REPROJECTION_PX = 4.0
+ITERATIONS = 5_000
+CONFIDENCE = 0.9999
+SAME_PLACE_PX = 4.0
+"""Matches that begin and end in the same squares of this side count once."""
+MIN_INLIERS = 12
+"""Fewer matches that agree on a pose are taken for chance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Matches:
+    """Features of one aerial and one ground view that look alike.
+
+    Attributes:
+        aerial_px, ground_px: (N, 2) pixels (x, y) in the two images.
+        points_ground: (N, 3) where the ground robot's depth puts them, in `ground` [m].
+    """
+
+    aerial_px: NDArray[np.float64]
+    ground_px: NDArray[np.float64]
+    points_ground: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Located:
+    """A camera pose and the matches that agree with it.
+
+    Attributes:
+        T_ground_camera: Pose of the MAV's camera, None where too few agree on any.
+        inliers: (N,) which of all matches agree, in the order of the views.
+    """
+
+    T_ground_camera: SE3 | None
+    inliers: NDArray[np.bool_]
+
+
+def located_by_appearance(given: Given, detector: cv2.Feature2D) -> Answer:
+    """Match the MAV's image with each ground view, and find the pose that all matches give.
+
+    Args:
+        given: With views.
+        detector: Finds and describes features in a grey image; compared by L2 distance.
+    """
+    if given.aerial_view is None or not given.ground_views:
+        return Answer(None, "no image of the ground robot looks at what the MAV sees")
+    matches = matches_of(given.aerial_view, given.ground_views, detector)
+    located = locate_camera(given.aerial_view, matches)
+    count = int(located.inliers.sum())
+    if located.T_ground_camera is None:
+        found = sum(len(of_view.aerial_px) for of_view in matches)
+        return Answer(None, f"{count} of {found} matches agree, {MIN_INLIERS} are needed")
+    return Answer(located.T_ground_camera @ given.aerial_view.T_map_camera.inverse())
+
+
+def matches_of(
+    aerial: View, ground_views: tuple[View, ...], detector: cv2.Feature2D
+) -> list[Matches]:
+    """Matches that pass the ratio test and have depth, for each ground view."""
+    aerial_px, aerial_words = _features(aerial.grey, detector)
+    made = []
+    for view in ground_views:
+        ground_px, ground_words = _features(view.grey, detector)
+        pairs = clear_matches(aerial_words, ground_words)
+        points, seen = _points_map(view, ground_px[pairs[:, 1]])
+        pairs, points = pairs[seen], points[seen]
+        kept = _distinct(aerial_px[pairs[:, 0]], ground_px[pairs[:, 1]])
+        pairs, points = pairs[kept], points[kept]
+        made.append(Matches(aerial_px[pairs[:, 0]], ground_px[pairs[:, 1]], points))
+    return made
+
+
+def locate_camera(aerial: View, matches: list[Matches]) -> Located:
+    """The pose of the MAV's camera in `ground` by PnP with RANSAC over all matches."""
+    pixels = np.concatenate([of_view.aerial_px for of_view in matches])
+    points = np.concatenate([of_view.points_ground for of_view in matches])
+    inliers = np.zeros(len(pixels), np.bool_)
+    if len(pixels) < MIN_INLIERS:
+        return Located(None, inliers)
+    cv2.setRNGSeed(0)
+    intrinsics = aerial.camera.matrix()
+    found, turn, shift, kept = cv2.solvePnPRansac(
+        points,
+        pixels,
+        intrinsics,
+        None,
+        iterationsCount=ITERATIONS,
+        reprojectionError=REPROJECTION_PX,
+        confidence=CONFIDENCE,
+        flags=cv2.SOLVEPNP_AP3P,
+    )
+    if not found or kept is None:
+        return Located(None, inliers)
+    inliers[kept.ravel()] = True
+    if inliers.sum() < MIN_INLIERS:
+        return Located(None, inliers)
+    turn, shift = cv2.solvePnPRefineLM(
+        points[inliers], pixels[inliers], intrinsics, None, turn, shift
+    )
+    rotation = nearest_rotation(cv2.Rodrigues(turn)[0])
+    if not (np.isfinite(rotation).all() and np.isfinite(shift).all()):
+        return Located(None, inliers)
+    return Located(SE3(rotation, np.asarray(shift, np.float64).ravel()).inverse(), inliers)
+
+
+def _features(
+    grey: NDArray[np.uint8], detector: cv2.Feature2D
+) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
+    """(N, 2) pixels (x, y) and (N, D) descriptors; those of simulated views may repeat."""
+    keypoints, words = detector.detectAndCompute(grey, None)
+    if words is None or len(keypoints) == 0:
+        return np.empty((0, 2)), np.empty((0, 128), np.float32)
+    return np.asarray(cv2.KeyPoint.convert(keypoints), np.float64), words.astype(np.float32)
+
+
+def _distinct(aerial_px: NDArray, ground_px: NDArray) -> NDArray[np.int64]:
+    """Indices of matches (N, 2) between other pixels than those before them.
+
+    Simulated views find one corner many times, which would pass for agreement.
+    """
+    places = np.floor(np.hstack([aerial_px, ground_px]) / SAME_PLACE_PX).astype(np.int64)
+    _, first = np.unique(places, axis=0, return_index=True)
+    return np.sort(first)
+
+
+def _points_map(view: View, pixels: NDArray) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """(N, 3) points in the robot's map [m] at pixels (N, 2), and which have depth."""
+    assert view.depth is not None
+    x, y = np.rint(pixels).astype(np.int64).T
+    inside = (x >= 0) & (x < view.camera.width) & (y >= 0) & (y < view.camera.height)
+    depth = np.full(len(pixels), np.nan)
+    depth[inside] = view.depth[y[inside], x[inside]]
+    camera = view.camera
+    rays = np.column_stack(
+        [(pixels[:, 0] - camera.cx) / camera.fx, (pixels[:, 1] - camera.cy) / camera.fy,
+         np.ones(len(pixels))]
+    )  # fmt: skip
+    return view.T_map_camera @ (rays * depth[:, None]), np.isfinite(depth)
+
+
+RATIO = 0.8
+"""A match must be this much nearer than the second best (Lowe, IJCV 2004, Sec. 7.1)."""
+_ROWS, _COLUMNS = 256, 2048  # so many products stay in the cache
+
+
+def clear_matches(aerial: NDArray[np.float32], ground: NDArray[np.float32]) -> NDArray[np.int64]:
+    """Features whose best match is clearly better than the second.
+
+    Args:
+        aerial: (N, D) descriptors.
+        ground: (M, D) descriptors.
+
+    Returns:
+        (K, 2) indices into both, in the order of the first.
+    """
+    if len(aerial) == 0 or len(ground) < 2:
+        return np.empty((0, 2), np.int64)
+    ground_squared = (ground**2).sum(axis=1)
+    tiles = [slice(start, start + _COLUMNS) for start in range(0, len(ground), _COLUMNS)]
+    transposed = [np.ascontiguousarray(ground[tile].T) for tile in tiles]
+    two_least = np.full((len(aerial), 2), np.inf, np.float32)
+    best = np.zeros(len(aerial), np.int64)
+    for start in range(0, len(aerial), _ROWS):
+        rows = slice(start, start + _ROWS)
+        for tile, words in zip(tiles, transposed, strict=True):
+            products = aerial[rows] @ words
+            _keep_nearest(products, ground_squared[tile], tile.start, two_least[rows], best[rows])
+    distances = np.maximum(two_least + (aerial**2).sum(axis=1)[:, None], 0)
+    kept = np.flatnonzero(distances[:, 0] < RATIO**2 * distances[:, 1])
+    return np.stack([kept, best[kept]], axis=1)
+
+
+@njit(cache=True, nogil=True)
+def _keep_nearest(products, ground_squared, start, two_least, best):  # type: ignore[no-untyped-def]
+    """Take in some more columns: squared distances, less what all of a row have in common."""
+    two = np.float32(2)
+    for row in range(len(products)):
+        first, second = two_least[row]
+        index = best[row]
+        for column in range(len(ground_squared)):
+            distance = ground_squared[column] - two * products[row, column]
+            if distance < second:
+                if distance < first:
+                    first, second, index = distance, first, start + column
+                else:
+                    second = distance
+        two_least[row, 0], two_least[row, 1], best[row] = first, second, index
+
+
+def asift_detector() -> cv2.Feature2D:
+    """SIFT under the tilts and rotations that its authors advise, as OpenCV has them."""
+    return cv2.AffineFeature.create(cv2.SIFT.create())
+
+
+def asift(given: Given) -> Answer:
+    """Where ASIFT features put the MAV's camera."""
+    return located_by_appearance(given, asift_detector())
+
+
+def sift(given: Given) -> Answer:
+    """Where SIFT features put the MAV's camera."""
+    return located_by_appearance(given, cv2.SIFT.create())

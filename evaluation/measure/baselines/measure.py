@@ -1,0 +1,123 @@
+"""Asks every baseline about the sightings of the refinement trials, and judges the answers."""
+
+from __future__ import annotations
+
+import importlib
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from airground.config import Config
+from airground.io.recording import Recording
+from airground.pipeline import Sighting
+from evaluation.measure.baselines.interface import Answer, Baseline, Given
+from evaluation.measure.baselines.table import BASELINES
+from evaluation.measure.baselines.views import GroundViews, aerial_view
+from evaluation.measure.protocol.mapping_pass import Maps
+from evaluation.measure.protocol.trials import noisy_start, spread_evenly, trial_sightings
+from evaluation.table.row_writer import RowWriter
+from evaluation.table.truth_errors import pose_error, true_T_ground_mav
+from sim.recording.truth import Truth
+
+STAGE = "baseline"
+"""Metrics are `NAME_claimed`, `NAME_horizontal_m`, `NAME_translation_m`, `NAME_rotation_deg` and
+`NAME_ms`; the note of `NAME_claimed` says why not. `NAME_missing` stands alone where what it
+imports is not installed."""
+
+
+def add_baselines(
+    out: RowWriter,
+    recording: Recording,
+    truth: Truth,
+    config: Config,
+    maps: Maps,
+    seed: tuple[int, int],
+    counts: tuple[int, int],
+) -> None:
+    """Write one answer of every baseline for some of the refinement trials.
+
+    Args:
+        out: Takes rows of the stage "baseline"; trials have the numbers of the refinement's,
+            and the noisy prior is the very start of that trial.
+        recording: Where images are read from.
+        truth: Judges the answers, and makes the priors.
+        config: Search region and thresholds.
+        maps: What was mapped.
+        seed: Of the recording and the flight.
+        counts: Refinement trials, and how many of them are tried here.
+    """
+    chosen = trial_sightings(len(maps.sightings), counts[0])
+    ground_views = GroundViews(recording, maps.tracked["ground"].front_end.live_poses())
+    installed = [baseline for baseline in BASELINES if _is_installed(baseline)]
+    for baseline in BASELINES:
+        if baseline not in installed:
+            reason = f"{baseline.module} is not installed (airground[baselines])"
+            out.add(STAGE, f"{baseline.name}_missing", 1.0, "", note=reason)
+    for trial in spread_evenly(len(chosen), counts[1]):
+        sighting = maps.sightings[chosen[trial]]
+        answers = ask_all(installed, recording, ground_views, sighting, truth, config, seed, trial)
+        for baseline, (answer, duration_ms) in zip(installed, answers, strict=True):
+            _add_answer(out, baseline.name, answer, duration_ms, sighting, truth, trial)
+
+
+def ask_all(
+    baselines: Sequence[Baseline],
+    recording: Recording,
+    ground_views: GroundViews,
+    sighting: Sighting,
+    truth: Truth,
+    config: Config,
+    seed: tuple[int, int],
+    trial: int,
+) -> list[tuple[Answer, float]]:
+    """Each baseline's answer to one sighting, and its time [ms], reading images left out."""
+    true = true_T_ground_mav(sighting, truth)
+    noisy = noisy_start(true, sighting.T_mav_camera, np.random.default_rng([*seed, 2, trial]))
+    priors = {"none": None, "noisy": noisy, "truth": true}
+    plain = Given(sighting, config, np.random.default_rng(0))
+    with_views = plain
+    if any(baseline.views for baseline in baselines):
+        views = ground_views.nearest(sighting, noisy)
+        with_views = replace(
+            plain, aerial_view=aerial_view(recording, sighting), ground_views=views
+        )
+    answers = []
+    for baseline in baselines:
+        given = replace(
+            with_views if baseline.views else plain,
+            prior=priors[baseline.prior],
+            rng=np.random.default_rng([*seed, 5, trial]),
+        )
+        started = time.perf_counter()
+        answer = baseline.locate(given)
+        answers.append((answer, (time.perf_counter() - started) * 1e3))
+    return answers
+
+
+def _add_answer(
+    out: RowWriter,
+    name: str,
+    answer: Answer,
+    duration_ms: float,
+    sighting: Sighting,
+    truth: Truth,
+    trial: int,
+) -> None:
+    errors = (np.nan, np.nan, np.nan)
+    if answer.T_ground_mav is not None:
+        error = pose_error(answer.T_ground_mav, sighting, truth)
+        errors = (error.horizontal_m, error.translation_m, error.rotation_deg)
+    out.add(STAGE, f"{name}_claimed", answer.claimed, "", trial=trial, note=answer.refusal)
+    for what, value in zip(("horizontal_m", "translation_m", "rotation_deg"), errors, strict=True):
+        out.add(STAGE, f"{name}_{what}", value, what.rpartition("_")[2], trial=trial)
+    out.add(STAGE, f"{name}_ms", duration_ms, "ms", trial=trial)
+
+
+def _is_installed(baseline: Baseline) -> bool:
+    """Imports what it needs, so that the time of its first answer does not hold that."""
+    try:
+        return not baseline.module or bool(importlib.import_module(baseline.module))
+    except ImportError:
+        return False

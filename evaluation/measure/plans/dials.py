@@ -1,0 +1,150 @@
+"""What a sweep can turn: scenes and sensors by the table below, the pipeline by its parameters."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from airground.config import Config
+from airground.errors import InputError
+from evaluation.setup.settings import with_value
+from sim.scene import MAX_HEAP_HEIGHT_M, Scene
+from sim.sensors.presets import SensorPreset, with_heading_error, with_noise
+
+Value = float | int | str | bool | list[Any]
+Point = Mapping[str, Value]
+"""Dials by name, and where each stands."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """All that dials act on."""
+
+    scene: Scene
+    sensors: SensorPreset
+    config: Config
+
+
+@dataclass(frozen=True)
+class Dial:
+    """A number that a sweep can vary.
+
+    Attributes:
+        name: As `--vary` knows it.
+        unit: Of its values; empty for a share or a factor.
+        low, high: The range of its values.
+        does: What it changes, in words.
+        turn: The subject with the dial at a value.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    does: str
+    turn: Callable[[Subject, float], Subject]
+
+
+DIALS = (
+    Dial(
+        "scene.overlap", "", 0.05, 1.0,
+        "median share of what the MAV flies over that the ground robot has seen before: the robot "
+        "stops when it has; the heap and the flight stay the same",
+        lambda subject, value: _part(subject, "ground", stop_at_overlap=value),
+    ),
+    Dial(
+        "scene.self_similarity", "", 0.0, 1.0,
+        "share of the boxes that are of one make",
+        lambda subject, value: _part(subject, "rubble", self_similarity=value),
+    ),
+    Dial(
+        "scene.heap_height", "", 0.1, 1.5,
+        "all boxes so many times as large, and so the heap about so much higher",
+        lambda subject, value: _part(subject, "rubble", size_scale=value),
+    ),
+    Dial(
+        "scene.flight_height", "m", MAX_HEAP_HEIGHT_M + 0.1, 10.0,
+        "height of the MAV's flight above the ground",
+        lambda subject, value: _part(subject, "mav", height_m=value),
+    ),
+    Dial(
+        "scene.camera_height", "m", 0.15, 2.0,
+        "height of the ground robot's camera above the ground",
+        lambda subject, value: _part(subject, "ground", camera_height_m=value),
+    ),
+    Dial(
+        "scene.texture", "", 0.0, 1.0,
+        "contrast of what is printed and painted on all surfaces; the light stays",
+        lambda subject, value: _scene(subject, texture=value),
+    ),
+    Dial(
+        "sensors.noise", "", 0.0, 10.0,
+        "factor of the noise of images, depth and inertial sensors",
+        lambda subject, value: replace(subject, sensors=with_noise(subject.sensors, value)),
+    ),
+    Dial(
+        "sensors.heading_error_deg", "deg", 0.0, 45.0,
+        "standard deviation of each robot's magnetic heading, which replaces the preset's",
+        lambda subject, value: replace(subject, sensors=with_heading_error(subject.sensors, value)),
+    ),
+)  # fmt: skip
+"""Those that are no parameters of the pipeline."""
+
+
+def dial_named(name: str) -> Dial | None:
+    """The dial of the table, or None for a parameter of the pipeline.
+
+    Raises:
+        InputError: It would have to be in the table, and is not.
+    """
+    known = {dial.name: dial for dial in DIALS}
+    if name not in known and name.startswith(("scene.", "sensors.")):
+        raise InputError(f"--vary {name}: unknown dial; known: {', '.join(known)}")
+    return known.get(name)
+
+
+def unit_of(name: str) -> str:
+    """The unit of a dial's values, as far as it has one."""
+    dial = dial_named(name)
+    return dial.unit if dial is not None else ""
+
+
+def turned(subject: Subject, point: Point) -> Subject:
+    """The subject with every dial where the point has it; their order does not matter.
+
+    Raises:
+        InputError: A dial is unknown, its value is out of its range, or the scene has no such
+            thing.
+    """
+    for name in sorted(point):
+        subject = _turned(subject, name, point[name])
+    return subject
+
+
+def _turned(subject: Subject, name: str, value: Value) -> Subject:
+    dial = dial_named(name)
+    if dial is None:
+        section, _, key = name.partition(".")
+        origin = f"--vary {name}"
+        return replace(subject, config=with_value(subject.config, section, key, value, origin))
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InputError(f"--vary {name}: {value!r} is no number")
+    if not dial.low <= value <= dial.high:
+        unit = f" {dial.unit}" if dial.unit else ""
+        raise InputError(
+            f"--vary {name}: {value:g} is out of its range, {dial.low:g} to {dial.high:g}{unit}"
+        )
+    return dial.turn(subject, float(value))
+
+
+def _part(subject: Subject, part: str, **change: float) -> Subject:
+    table = getattr(subject.scene, part)
+    if table is None:
+        raise InputError(f"--vary: scene '{subject.scene.name}' has no [{part}] to change")
+    return _scene(subject, **{part: table.model_copy(update=change)})
+
+
+def _scene(subject: Subject, **change: object) -> Subject:
+    return replace(subject, scene=subject.scene.model_copy(update=change))

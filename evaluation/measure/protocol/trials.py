@@ -1,0 +1,195 @@
+"""The paper's experiments on recorded sightings: sequences (Fig. 11, 12), trials (Fig. 13, 14)."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from airground.config import Config
+from airground.core.belief import Alignment, Belief
+from airground.core.events import BeliefUpdated, CostMapComputed, Event, HeightMapsMade
+from airground.core.se3 import SE3
+from airground.localization.height_map_pair import HeightMapPair
+from airground.localization.particle_filter import MonteCarloLocalizer
+from airground.pipeline import Sighting, pair_of
+from airground.refinement import refine
+from evaluation.run.onlooker import timed
+from evaluation.table.truth_errors import (
+    PoseError,
+    pose_error,
+    squared_mahalanobis,
+    true_T_ground_mav,
+)
+from sim.recording.truth import Truth
+
+SEQUENCE_LENGTH = 12
+"""Aerial maps in a sequence (Sec. VIII-C)."""
+
+START_NOISE_M, START_NOISE_DEG = 0.2, 3.0
+"""Standard deviation per axis of a refinement trial's start (Sec. VIII-D)."""
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """How much is measured on each recording.
+
+    Attributes:
+        sequences: Sequences of aerial maps, spread evenly over the flight.
+        trials: Refinements from a noisy start, likewise.
+        baselines: How many of these trials every baseline is tried on as well.
+        sequence_length: Aerial maps in a sequence.
+        wide_searches: Aerial maps that are looked for one by one in a wider region.
+    """
+
+    sequences: int = 7
+    trials: int = 12
+    baselines: int = 0
+    sequence_length: int = SEQUENCE_LENGTH
+    wide_searches: int = 0
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """One aerial map taken in by one sequence.
+
+    Attributes:
+        belief: What the filter says then.
+        error: How far off that is.
+        squared_mahalanobis: The same in its own measure (`evaluation.judge.claims`).
+    """
+
+    belief: Belief
+    error: PoseError
+    squared_mahalanobis: float
+
+
+@dataclass(frozen=True)
+class RefinementTrial:
+    """One alignment from a noisy start.
+
+    Attributes:
+        alignment: What refinement said.
+        errors: "before" of the start, "after" of the result, and "from_truth" of the result
+            when started at the truth: the bound that drift and the maps' errors set.
+        duration_ms: How long it took, preparation included.
+    """
+
+    alignment: Alignment
+    errors: dict[str, PoseError]
+    duration_ms: float
+
+
+def sequence_starts(sightings: int, sequences: int, length: int = SEQUENCE_LENGTH) -> list[int]:
+    """Where sequences begin: spread evenly over a flight, chosen by nothing else.
+
+    A flight with fewer aerial maps than a sequence has gives one; what it lacks counts as failed.
+    """
+    last = max(0, sightings - length)
+    return sorted({round(start) for start in np.linspace(0, last, sequences)})
+
+
+def trial_sightings(sightings: int, trials: int) -> list[int]:
+    """Which sightings refinement is tried on: spread evenly, each at most once."""
+    return spread_evenly(sightings, min(trials, sightings))
+
+
+def spread_evenly(total: int, count: int) -> list[int]:
+    """`count` of the indices below `total`, the first and the last among them."""
+    return [round(index) for index in np.linspace(0, total - 1, min(count, total))]
+
+
+def localize_sequence(
+    sightings: Sequence[Sighting], truth: Truth, config: Config, rng: np.random.Generator
+) -> Iterator[tuple[Event, float, Iteration | None]]:
+    """Start a new filter and feed it the sightings.
+
+    Yields every event with its time [ms], and with the iteration that it completes.
+    """
+    localizer = MonteCarloLocalizer(config, rng)
+    for sighting in sightings:
+        yield from _taken_in(localizer, pair_of(sighting, config), sighting, truth)
+
+
+def localize_sequences(
+    sightings: Sequence[Sighting],
+    length: int,
+    truth: Truth,
+    config: Config,
+    filters: Sequence[tuple[int, np.random.Generator]],
+) -> Iterator[tuple[int, Event, float | None, Iteration | None]]:
+    """Run sequences that overlap side by side, each as `localize_sequence` would.
+
+    What an aerial map says by itself is computed once for all of them: with headings searched,
+    that is nearly everything.
+
+    Args:
+        sightings: Of a flight.
+        length: Sightings in a sequence.
+        truth: Judges.
+        config: Of all filters.
+        filters: Where each sequence begins, and its source of randomness.
+
+    Yields:
+        The number of the sequence, and its next event; its time [ms], None where another
+        sequence had it computed; the iteration that it completes.
+    """
+    localizers = [MonteCarloLocalizer(config, rng) for _, rng in filters]
+    for index, sighting in enumerate(sightings):
+        pair, computed = pair_of(sighting, config), set[type[Event]]()
+        for sequence, (start, _) in enumerate(filters):
+            if start <= index < start + length:
+                steps = _taken_in(localizers[sequence], pair, sighting, truth)
+                for event, duration_ms, iteration in steps:
+                    again = type(event) in computed
+                    yield sequence, event, None if again else duration_ms, iteration
+                    if isinstance(event, (HeightMapsMade, CostMapComputed)):
+                        computed.add(type(event))
+
+
+def _taken_in(
+    localizer: MonteCarloLocalizer, pair: HeightMapPair, sighting: Sighting, truth: Truth
+) -> Iterator[tuple[Event, float, Iteration | None]]:
+    for event, duration_ms in timed(localizer.update(pair)):
+        iteration = None
+        if isinstance(event, BeliefUpdated):
+            error = pose_error(event.belief.T_ground_mav, sighting, truth)
+            distance = squared_mahalanobis(event.belief, sighting, truth)
+            iteration = Iteration(event.belief, error, distance)
+        yield event, duration_ms, iteration
+
+
+def noisy_start(T_ground_mav: SE3, T_mav_camera: SE3, rng: np.random.Generator) -> SE3:
+    """The true relation with noise on the MAV's camera pose, per axis as stated above."""
+    T_ground_camera = T_ground_mav @ T_mav_camera
+    turn = SE3.from_rotation_vector(np.deg2rad(rng.normal(0, START_NOISE_DEG, 3)))
+    T_noisy = SE3(
+        (turn @ SE3(T_ground_camera.rotation, np.zeros(3))).rotation,
+        T_ground_camera.translation + rng.normal(0, START_NOISE_M, 3),
+    )
+    return T_noisy @ T_mav_camera.inverse()
+
+
+def refine_sighting(
+    sighting: Sighting, truth: Truth, config: Config, rng: np.random.Generator
+) -> RefinementTrial:
+    """One refinement from a noisy start, and one from the truth."""
+    true = true_T_ground_mav(sighting, truth)
+    start = noisy_start(true, sighting.T_mav_camera, rng)
+    started = time.perf_counter()
+    alignment = _refined(sighting, start, config)
+    duration_ms = (time.perf_counter() - started) * 1e3
+    poses = {
+        "before": start,
+        "after": alignment.T_ground_mav,
+        "from_truth": _refined(sighting, true, config).T_ground_mav,
+    }
+    errors = {when: pose_error(pose, sighting, truth) for when, pose in poses.items()}
+    return RefinementTrial(alignment, errors, duration_ms)
+
+
+def _refined(sighting: Sighting, start: SE3, config: Config) -> Alignment:
+    surface = sighting.surface
+    return refine(surface.stamp_ns, start, surface.cloud_mav, sighting.ground_cloud, config)

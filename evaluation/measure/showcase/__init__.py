@@ -1,0 +1,1 @@
+"""One flight looked at closely: the data that pictures are drawn from."""

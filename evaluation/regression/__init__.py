@@ -1,1 +1,0 @@
-"""Did a change make it better or worse: watched metrics, accepted figures, verdicts."""

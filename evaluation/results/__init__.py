@@ -1,1 +1,0 @@
-"""What experiments leave: rows, the folder they lie in, and the summary."""

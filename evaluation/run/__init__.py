@@ -1,0 +1,1 @@
+"""The shipped pipeline over one recording, live or not, one robot alone or both."""

@@ -1,0 +1,214 @@
+"""Two robots' recordings from anywhere through the whole pipeline, with no truth between them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from airground.augmentation import AugmentedMap
+from airground.core.belief import Alignment
+from airground.core.cloud import Source
+from airground.core.events import Aligned, BeliefUpdated, SurfaceCast
+from airground.core.trajectory import Trajectory
+from airground.errors import InputError
+from airground.io.pair import Pair
+from airground.io.ply import write_ply
+from airground.io.tum import write_tum
+from airground.pipeline import Pipeline, sight
+from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
+from airground.tracking import FrontEnds, Trackers
+from airground.warm_up import warm_up
+from evaluation.run.alone import error_against, of_pose_frame
+from evaluation.run.given_map import enter
+from evaluation.run.onlooker import Audience, Onlooker, timed
+from evaluation.run.recording import pipeline_rng
+from evaluation.run.tracking import front_end_rng
+from evaluation.setup.setups import Setup
+from evaluation.table.tracking_log import Tracked, WatchedFrontEnd
+from evaluation.table.true_camera import true_camera
+
+ROBOTS = {Source.MAV: "mav", Source.GROUND: "ground"}
+
+
+@dataclass(frozen=True, eq=False)
+class PairResult:
+    """What a run leaves.
+
+    Attributes:
+        tracked: What the front ends said.
+        augmented: The augmented map.
+        surfaces: How many aerial surfaces were made.
+        converged: After how many of them a position was claimed.
+        alignments: Every refinement, in order of time.
+    """
+
+    tracked: dict[Source, Tracked]
+    augmented: AugmentedMap
+    surfaces: int
+    converged: int
+    alignments: list[Alignment]
+
+    def accepted(self) -> Trajectory | None:
+        """`T_ground_mav` of the accepted alignments, by the stamps of their surfaces."""
+        accepted = [one for one in self.alignments if one.accepted]
+        if not accepted:
+            return None
+        poses = [alignment.T_ground_mav for alignment in accepted]
+        return Trajectory.from_poses([alignment.stamp_ns for alignment in accepted], poses)
+
+
+def run_pair(pair: Pair, setup: Setup, seed: int, onlookers: Sequence[Onlooker] = ()) -> PairResult:
+    """Run the pipeline of Figure 4 from the first message to the last.
+
+    A recording of ours that was exported and comes back gives the same result as itself.
+
+    Args:
+        pair: What both robots sensed.
+        setup: How the pipeline is set.
+        seed: Of all that is random.
+        onlookers: They see every event.
+
+    Raises:
+        InputError: The heading is to be known, but a robot has no magnetometer.
+    """
+    _check_heading(pair, setup)
+    front_ends = _front_ends(pair, setup, seed)
+    trackers = Trackers(pair.mav.calibration, pair.ground.calibration, FrontEnds(*front_ends))
+    pipeline = Pipeline(
+        setup.config, pair.mav.calibration, pair.ground.calibration, pipeline_rng(seed)
+    )
+    enter(setup.given, pipeline)
+    audience, sighting = Audience(onlookers), None
+    if audience:  # who is shown times, without those of compiling
+        warm_up(setup.config, np.random.default_rng(0))
+    surfaces = converged = 0
+    alignments = []
+    frames = audience.noted(trackers.frames(pair.messages()))
+    for event, duration_ms in timed(pipeline.run(frames)):
+        match event:
+            case SurfaceCast():
+                surfaces += 1
+                sighting = sight(event.surface, pipeline.mapping) if audience else None
+            case BeliefUpdated():
+                converged += event.belief.converged
+            case Aligned():
+                alignments.append(event.alignment)
+        audience.show(event, duration_ms, sighting)
+    pipeline.mapping.correct_ground(trackers.finish())
+    tracked = {
+        robot: Tracked(ROBOTS[robot], one, one.trajectory(), ROBOTS[robot] in setup.slam_robots())
+        for robot, one in zip((Source.MAV, Source.GROUND), front_ends, strict=True)
+    }
+    return PairResult(tracked, pipeline.augmented_map(), surfaces, converged, alignments)
+
+
+def write_pair(folder: Path, pair: Pair, setup: Setup, result: PairResult) -> dict[str, Any]:
+    """Write the map, the trajectories and a summary; returns the summary.
+
+    `mav.tum` and `ground.tum` are as believed at the end, `*_live.tum` as first said, of the
+    frame whose truth each publisher states; `T_ground_mav.tum` has the accepted alignments.
+    """
+    augmented = result.augmented
+    write_ply(folder / "augmented_map.ply", augmented.cloud_ground, augmented.sources)
+    accepted = result.accepted()
+    if accepted is not None:
+        write_tum(folder / "T_ground_mav.tum", accepted)
+    summary = {
+        "schema": "airground-pair",
+        "version": 1,
+        "preset": setup.config.preset,
+        "replaced": setup.given.describe(),
+        "aerial_surfaces": result.surfaces,
+        "located": result.converged,
+        "alignments": len(result.alignments),
+        "accepted": 0 if accepted is None else len(accepted),
+        "map_points": {
+            name: int((augmented.sources == robot).sum()) for robot, name in ROBOTS.items()
+        },
+        "robots": {
+            name: _robot(folder, pair, robot, result.tracked[robot])
+            for robot, name in ROBOTS.items()
+        },
+    }
+    text = json.dumps(summary, indent=2) + "\n"
+    (folder / "summary.json").write_text(text, encoding="utf-8")
+    return summary
+
+
+def print_pair(summary: dict[str, Any], console: Console | None = None) -> None:
+    """Print the summary as a short table."""
+    shown = Table(
+        title=f"both robots, preset {summary['preset']}",
+        caption=summary["replaced"] or None,
+        title_justify="left",
+        caption_justify="left",
+    )
+    shown.add_column("")
+    shown.add_column("here", justify="right", style="bold")
+    shown.add_row("aerial surfaces", str(summary["aerial_surfaces"]))
+    shown.add_row("located after", str(summary["located"]))
+    shown.add_row("alignments accepted", f"{summary['accepted']} of {summary['alignments']}")
+    for name, robot in summary["robots"].items():
+        shown.add_row(f"{name}: tracked", f"{100 * robot['tracked_fraction']:.1f} %")
+        error = robot["error"]["final"]
+        rms = "truth unknown" if error is None else f"{100 * error['ate_se3_rmse_m']:.2f} cm"
+        shown.add_row(f"{name}: RMS after SE3", rms)
+    (console or Console()).print(shown)
+
+
+def _front_ends(pair: Pair, setup: Setup, seed: int) -> tuple[WatchedFrontEnd, WatchedFrontEnd]:
+    rng = front_end_rng(seed)
+    # As in `front_ends_for`, where oracles take the first two: the same seed, the same result.
+    _, (mav_rng, ground_rng) = rng.spawn(2), rng.spawn(2)
+    given, config = setup.given, setup.config
+    for_mav = Ingredients(pair.mav.calibration, config, mav_rng, given.mav)
+    for_ground = Ingredients(pair.ground.calibration, config, ground_rng, given.ground)
+    names = {robot: "file" if robot in given.robots() else "slam" for robot in ROBOTS.values()}
+    return (
+        WatchedFrontEnd(make_front_end(MAV, names["mav"], for_mav)),
+        WatchedFrontEnd(make_front_end(GROUND, names["ground"], for_ground)),
+    )
+
+
+def _check_heading(pair: Pair, setup: Setup) -> None:
+    if setup.config.localization.heading == "search":
+        return
+    for recording in (pair.mav, pair.ground):
+        if recording.magnetic is None:
+            raise InputError(
+                f"{recording.path}: has no magnetometer (mag0), so that the heading is unknown; "
+                "give --heading search"
+            )
+
+
+def _robot(folder: Path, pair: Pair, robot: Source, tracked: Tracked) -> dict[str, Any]:
+    """What is said of one robot; its trajectories are written along the way."""
+    recording, name = pair.of(robot), ROBOTS[robot]
+    true_pose = true_camera(recording)
+    live_poses = tracked.front_end.live_poses()
+    live = None
+    if live_poses:
+        live = Trajectory.from_poses([t for t, _ in live_poses], [T for _, T in live_poses])
+    for file, path in ((name, tracked.final), (f"{name}_live", live)):
+        if path is not None:
+            write_tum(folder / f"{file}.tum", of_pose_frame(path, recording.T_pose_camera))
+    answers = tracked.front_end.answers
+    return {
+        "layout": recording.layout,
+        "pose_frame": recording.pose_frame,
+        "recorded_s": recording.duration_s,
+        "images": len(answers),
+        "tracked_fraction": len(live_poses) / len(answers),
+        "frame_ms_median": float(np.median(tracked.front_end.durations_ms)),
+        "error": {
+            "final": error_against(true_pose, tracked.final),
+            "live": error_against(true_pose, live),
+        },
+    }

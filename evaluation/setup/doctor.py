@@ -1,0 +1,218 @@
+"""Looks over the machine: what works, what is missing, and what to do about it."""
+
+from __future__ import annotations
+
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+from importlib import metadata
+from pathlib import Path
+
+from evaluation.setup.environment import usable_cores
+from evaluation.setup.system_libraries import SYSTEM_LIBRARIES
+
+MIN_MEMORY_GIB = 4.0
+MIN_DISK_GIB = 4.0
+WORKING_PYOPENGL = (3, 1, 10)
+"""The oldest PyOpenGL whose EGL MuJoCo can use."""
+
+MUJOCO_FRAME = """
+import mujoco
+spec = mujoco.MjSpec()
+spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[.1, .1, .1])
+spec.worldbody.add_light(pos=[0, 0, 3])
+spec.worldbody.add_camera(name="c", pos=[0, 0, 1])
+model = spec.compile()
+data = mujoco.MjData(model)
+mujoco.mj_forward(model, data)
+renderer = mujoco.Renderer(model, 60, 80)
+renderer.update_scene(data, "c")
+assert renderer.render().max() > 0, "the picture is black"
+renderer.enable_depth_rendering()
+centre = float(renderer.render()[30, 40])
+assert abs(centre - 0.9) < 1e-3, f"depth of the box is {centre} m instead of 0.9 m"
+renderer.close()
+"""
+
+PYRENDER_FRAME = """
+import numpy as np, pyrender, trimesh
+scene = pyrender.Scene(ambient_light=[1.0, 1.0, 1.0])
+scene.add(pyrender.Mesh.from_trimesh(trimesh.creation.box((.2, .2, .2))))
+pose = np.eye(4)
+pose[2, 3] = 1.0
+scene.add(pyrender.PerspectiveCamera(yfov=1.0), pose=pose)
+renderer = pyrender.OffscreenRenderer(80, 60)
+colour, depth = renderer.render(scene)
+centre = float(depth[30, 40])
+assert abs(centre - 0.9) < 1e-2, f"depth of the box is {centre} m instead of 0.9 m"
+renderer.delete()
+"""
+
+NUMBA_LOOP = """
+import numba, numpy as np
+@numba.njit(parallel=True)
+def total(values):
+    result = 0.0
+    for i in numba.prange(len(values)):
+        result += values[i]
+    return result
+assert total(np.ones(1000)) == 1000
+print(numba.threading_layer(), numba.get_num_threads(), "threads")
+"""
+
+
+class Health(Enum):
+    """How bad a finding is."""
+
+    FINE = "ok"
+    POOR = "poor"
+    BROKEN = "missing"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at.
+
+    Attributes:
+        what: Its name.
+        health: How it is.
+        detail: What was found.
+        remedy: What to do; empty when fine.
+    """
+
+    what: str
+    health: Health
+    detail: str
+    remedy: str = ""
+
+
+def examine() -> list[Finding]:
+    """Look at everything; takes some seconds, since pictures are rendered."""
+    return [
+        python(),
+        cores(),
+        memory(),
+        disk(Path.cwd()),
+        *libraries(),
+        pyopengl(metadata.version("PyOpenGL")),
+        *rendering(),
+        threading(),
+    ]
+
+
+def show(findings: list[Finding]) -> None:
+    """Print a table and, below, what to do."""
+    from rich.console import Console
+    from rich.table import Table
+
+    colours = {Health.FINE: "green", Health.POOR: "yellow", Health.BROKEN: "red"}
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for heading in ("what", "", "found"):
+        table.add_column(heading, overflow="fold")
+    for f in findings:
+        colour = colours[f.health]
+        table.add_row(f.what, f"[{colour}]{f.health.value}[/{colour}]", f.detail)
+    console = Console(soft_wrap=False)
+    console.print(table)
+    for finding in findings:
+        if finding.health != Health.FINE:
+            console.print(f"{finding.what}: {finding.remedy}", markup=False, highlight=False)
+
+
+def python() -> Finding:
+    return Finding("python", Health.FINE, f"{platform.python_version()} on {platform.machine()}")
+
+
+def cores() -> Finding:
+    return Finding("cores", Health.FINE, f"{usable_cores()} of {os.cpu_count()}")
+
+
+def memory() -> Finding:
+    pages = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    gib = pages / 2**30
+    if gib < MIN_MEMORY_GIB:
+        remedy = f"have at least {MIN_MEMORY_GIB:g} GiB of memory"
+        return Finding("memory", Health.POOR, f"{gib:.1f} GiB", remedy)
+    return Finding("memory", Health.FINE, f"{gib:.1f} GiB")
+
+
+def disk(folder: Path) -> Finding:
+    gib = shutil.disk_usage(folder).free / 2**30
+    detail = f"{gib:.1f} GiB free in {folder}"
+    if gib < MIN_DISK_GIB:
+        remedy = f"free {MIN_DISK_GIB:g} GiB: a minute of recording takes about 2 GiB"
+        return Finding("disk", Health.POOR, detail, remedy)
+    return Finding("disk", Health.FINE, detail)
+
+
+def libraries() -> Iterator[Finding]:
+    for library in SYSTEM_LIBRARIES:
+        if library.present():
+            yield Finding(library.soname, Health.FINE, "found")
+            continue
+        health = Health.BROKEN if library.required else Health.POOR
+        remedy = f"install {library.package} (sudo apt-get install {library.package})"
+        yield Finding(library.soname, health, f"needed by {library.needed_by}", remedy)
+
+
+def pyopengl(version: str) -> Finding:
+    """pyrender asks for a PyOpenGL on which MuJoCo's EGL fails."""
+    numbers = tuple(int(part) for part in version.split(".")[:3] if part.isdigit())
+    if numbers < WORKING_PYOPENGL:
+        remedy = "install 3.1.10 or newer without dependencies: pip install --no-deps PyOpenGL"
+        return Finding("PyOpenGL", Health.BROKEN, version, remedy)
+    return Finding("PyOpenGL", Health.FINE, version)
+
+
+def rendering() -> Iterator[Finding]:
+    """Render a frame each with EGL and OSMesa; one of the two suffices."""
+    results = {
+        (name, backend): _try(script, MUJOCO_GL=backend, PYOPENGL_PLATFORM=backend)
+        for name, script in (("mujoco", MUJOCO_FRAME), ("pyrender", PYRENDER_FRAME))
+        for backend in ("egl", "osmesa")
+    }
+    for (name, backend), (works, said) in results.items():
+        other = "osmesa" if backend == "egl" else "egl"
+        if works:
+            yield Finding(f"{name} with {backend}", Health.FINE, "renders")
+        elif results[name, other][0]:
+            remedy = f"not needed; MUJOCO_GL={other} PYOPENGL_PLATFORM={other} works"
+            yield Finding(f"{name} with {backend}", Health.POOR, said, remedy)
+        else:
+            remedy = "install libegl1 libgl1 libgl1-mesa-dri, or libosmesa6"
+            yield Finding(f"{name} with {backend}", Health.BROKEN, said, remedy)
+
+
+def threading() -> Finding:
+    works, said = _try(NUMBA_LOOP)
+    if works:
+        return Finding("numba", Health.FINE, said)
+    return Finding("numba", Health.BROKEN, said, "install libgomp1, then the locked packages anew")
+
+
+def _try(script: str, **environment: str) -> tuple[bool, str]:
+    """Whether a Python script runs, in a process of its own, and its last line."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "attempt.py"
+        file.write_text(script, encoding="utf-8")
+        try:
+            done = subprocess.run(
+                [sys.executable, str(file)],
+                env={**os.environ, **environment},
+                capture_output=True,
+                text=True,
+                timeout=120,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            return False, "no answer within two minutes"
+    said = (done.stdout if done.returncode == 0 else done.stderr).strip().splitlines()
+    if done.returncode < 0:
+        return False, f"died of signal {-done.returncode}"
+    return done.returncode == 0, said[-1] if said else ""

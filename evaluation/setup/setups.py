@@ -1,0 +1,178 @@
+"""What is varied: a setup is a configuration of the pipeline, a kind of poses, given results."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from airground.config import Config, paper
+from airground.core.cloud import PointCloud
+from airground.core.trajectory import Trajectory
+from evaluation.setup.condition import Condition
+
+
+@dataclass(frozen=True)
+class PoseNoise:
+    """How wrong an oracle's poses are.
+
+    Attributes:
+        drift_mav_m: RMS of the MAV's slow position error after SE3 alignment [m].
+        drift_ground_m: RMS of the ground robot's drift after SE3 alignment [m].
+        white_m: Standard deviation of independent position noise per axis and frame [m].
+        white_deg: The same of the orientation, per axis [deg].
+    """
+
+    drift_mav_m: float = 0.0
+    drift_ground_m: float = 0.0
+    white_m: float = 0.0
+    white_deg: float = 0.0
+
+    def describe(self) -> str:
+        """For captions: "exact poses", or what was added to them."""
+        parts = []
+        if self.drift_mav_m or self.drift_ground_m:
+            parts.append(
+                f"drift {self.drift_mav_m * 100:g} cm (MAV) and "
+                f"{self.drift_ground_m * 100:g} cm (ground) RMS"
+            )
+        if self.white_m or self.white_deg:
+            parts.append(f"noise {self.white_m * 1000:g} mm and {self.white_deg:g} deg a frame")
+        return "oracle poses, " + (" and ".join(parts) or "exact")
+
+
+EXACT = PoseNoise()
+
+PAPER_DRIFT = PoseNoise(drift_mav_m=0.012, drift_ground_m=0.038)
+"""What the paper measured for its SLAM (Fig. 9, 10)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Given:
+    """Results of other systems; None where ours do the work.
+
+    Attributes:
+        mav, ground: Poses `T_map_camera`, metric with z up.
+        ground_map: In the frame of the ground robot's poses.
+    """
+
+    mav: Trajectory | None = None
+    ground: Trajectory | None = None
+    ground_map: PointCloud | None = None
+
+    def robots(self) -> frozenset[str]:
+        """Those of "mav" and "ground" whose poses are given."""
+        poses = {"mav": self.mav, "ground": self.ground}
+        return frozenset(robot for robot, given in poses.items() if given is not None)
+
+    def describe(self) -> str:
+        """How results name what was replaced; empty where nothing was."""
+        parts = {"MAV poses": self.mav, "ground poses": self.ground, "ground map": self.ground_map}
+        names = [name for name, given in parts.items() if given is not None]
+        return f"{', '.join(names)} from a file" if names else ""
+
+
+NOTHING = Given()
+
+
+Poses = Literal["slam", "oracle", "slam, exact mav", "slam, exact ground"]
+"""Where poses come from: each robot's own SLAM, or the truth for both or one of them."""
+
+FrontEndName = Literal["slam", "oracle", "file"]
+"""Who tracks a robot: its own SLAM, the truth, or a trajectory that the user brought along."""
+
+ROBOTS = {"mav", "ground"}
+
+
+@dataclass(frozen=True)
+class Setup:
+    """One column of the report.
+
+    Attributes:
+        config: The pipeline's parameters.
+        poses: Where the cameras' poses come from.
+        noise: What was added to the oracle's poses.
+        variant: What else differs from the preset, in words.
+        given: What the user brings along in place of a stage.
+    """
+
+    config: Config
+    poses: Poses = "slam"
+    noise: PoseNoise = EXACT
+    variant: str = ""
+    given: Given = NOTHING
+
+    def front_ends(self) -> dict[str, FrontEndName]:
+        """Who tracks "mav" and "ground"."""
+        oracles = {"oracle": ROBOTS, "slam, exact mav": {"mav"}, "slam, exact ground": {"ground"}}
+        way: dict[str, FrontEndName] = dict.fromkeys(ROBOTS, "slam")
+        way |= dict.fromkeys(oracles.get(self.poses, set()), "oracle")
+        return way | dict.fromkeys(self.given.robots(), "file")
+
+    def slam_robots(self) -> frozenset[str]:
+        """Those of "mav" and "ground" whose poses come from SLAM."""
+        return frozenset(robot for robot, way in self.front_ends().items() if way == "slam")
+
+    def needs_truth(self) -> bool:
+        """Whether any robot's poses come from an oracle."""
+        return "oracle" in self.front_ends().values()
+
+    def condition(self, sensors: str) -> Condition:
+        """How results name this setup."""
+        poses: str = self.poses
+        if poses == "oracle":
+            poses = "oracle exact" if self.noise == EXACT else "oracle with drift"
+        return Condition(
+            preset=self.config.preset,
+            poses=poses,
+            sensors=sensors,
+            heading=self.config.localization.heading,
+            variant=self.variant,
+        )
+
+    def maps_like(self, other: Setup) -> bool:
+        """Whether both make the same maps: only what comes after may differ."""
+        unused = {"preset", "height_maps", "localization", "refinement"}
+        if self.poses == "oracle":
+            unused |= {"monocular_slam", "rgbd_slam"}
+        mine, theirs = (s.config.model_dump(exclude=unused) for s in (self, other))
+        return mine == theirs and (self.poses, self.noise) == (other.poses, other.noise)
+
+
+def with_localization(config: Config, **changes: object) -> Config:
+    """`config` with some parameters of Monte Carlo localization changed, and validated."""
+    localization = {**config.localization.model_dump(), **changes}
+    return Config.model_validate({**config.model_dump(), "localization": localization})
+
+
+def with_companions(primary: Setup, few: bool = False) -> list[Setup]:
+    """The primary setup first, then what the report shows beside it.
+
+    Args:
+        primary: What the user asked for.
+        few: Only the true poses beside it, and the paper's constants with both readings of
+            its sigma.
+    """
+    best, published = Config(), paper()
+    minmax = with_localization(published, sigma_units="minmax")
+    companions = [
+        Setup(best, "oracle"),
+        Setup(published),
+        Setup(minmax, variant="sigma 0.08 of the cost scaled to [0, 1]"),
+    ]
+    if not few:
+        companions += [Setup(best), Setup(with_localization(best, heading="search"))]
+    known = (primary.config, primary.poses, primary.noise)
+    return [primary, *(o for o in companions if (o.config, o.poses, o.noise) != known)]
+
+
+def grouped_by_maps(setups: list[Setup]) -> list[list[Setup]]:
+    """Setups that share their maps, together: mapping is the expensive part."""
+    groups: list[list[Setup]] = []
+    for setup in setups:
+        for group in groups:
+            if setup.maps_like(group[0]):
+                group.append(setup)
+                break
+        else:
+            groups.append([setup])
+    return groups

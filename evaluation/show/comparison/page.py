@@ -1,0 +1,189 @@
+"""`compare.html`: one self-contained page that says what changed between runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from evaluation.judge.runs import Against, Run
+from evaluation.judge.samples import Flight
+from evaluation.judge.verdict import Judged
+from evaluation.show.comparison.figures import comparison_figures
+from evaluation.show.comparison.verdict_table import HEADER, MOVED, cells, conclusion, conditions
+from evaluation.show.report.failures import Failure, failures
+from evaluation.show.report.page import rendered, saved_picture
+from evaluation.show.report.tables import MISSING, TextTable
+
+PAGE = "compare.html"
+
+
+@dataclass(frozen=True)
+class Section:
+    """What the page says of one run, beside the figures."""
+
+    name: str
+    outcome: str
+    conclusion: str
+    judged: str
+    caveats: list[str]
+    moved: TextTable
+    rest: TextTable
+    failures: FailuresMoved | None
+
+    @classmethod
+    def of(cls, held: Against) -> Section:
+        return cls(
+            name=held.run.name,
+            outcome=held.outcome(),
+            conclusion=conclusion(held.comparison),
+            judged=conditions(held.comparison),
+            caveats=held.caveats(),
+            moved=moved_table(held),
+            rest=rest_table(held),
+            failures=failures_moved(held) if held.shared else None,
+        )
+
+
+def write_comparison(out: Path, helds: Sequence[Against]) -> None:
+    """Write the page and `figures/` (PNG and PDF) into an existing folder.
+
+    Args:
+        out: Where.
+        helds: At least one; all have the same reference.
+    """
+    reference = helds[0].reference
+    runs = [reference, *(held.run for held in helds)]
+    page = rendered(
+        "compare.html.j2",
+        reference=reference.name,
+        sections=[Section.of(held) for held in helds],
+        overview=overview_table(helds) if len(helds) > 1 else None,
+        pictures=[saved_picture(drawn, out) for drawn in comparison_figures(helds)],
+        differing=difference_table(runs),
+        common=common_table(runs),
+    )
+    (out / PAGE).write_text(page, encoding="utf-8")
+
+
+def moved_table(held: Against) -> TextTable:
+    """Metrics that moved beyond chance, worse first."""
+    return _verdicts(held, _moved(held))
+
+
+def rest_table(held: Against) -> TextTable:
+    """Metrics in which no difference was seen, or that were not measured."""
+    moved = _moved(held)
+    return _verdicts(held, [one for one in held.comparison.judged if one not in moved])
+
+
+def overview_table(helds: Sequence[Against]) -> TextTable:
+    """Every metric that moved in some run: its figure and verdict in each."""
+    moved = {one.metric.name for held in helds for one in _moved(held)}
+    rows = []
+    for judged in zip(*(held.comparison.judged for held in helds), strict=True):
+        if judged[0].metric.name in moved:
+            told = [cells(one) for one in judged]
+            rows.append((told[0][0], told[0][1], *(f"{row[2]}\n{row[-1]}" for row in told)))
+    names = [helds[0].reference.name, *(held.run.name for held in helds)]
+    return TextTable(("metric", *names), tuple(rows))
+
+
+def difference_table(runs: Sequence[Run]) -> TextTable:
+    """Conditions and parameters in which the runs differ."""
+    return _in_common(runs, common=False)
+
+
+def common_table(runs: Sequence[Run]) -> TextTable:
+    """Conditions that all runs share."""
+    return _in_common(runs, common=True)
+
+
+@dataclass(frozen=True)
+class FailuresMoved:
+    """Failures of a run beside those of the reference, over the same flights.
+
+    Attributes:
+        appeared: Those that only the run has.
+        went: Those that only the reference has.
+        stayed: How many both have.
+    """
+
+    appeared: list[Failure]
+    went: list[Failure]
+    stayed: int
+
+
+def failures_moved(held: Against) -> FailuresMoved:
+    """What failed on one side only."""
+    before, after = (
+        {failure.key: failure for failure in failures(run.on(held.shared))}
+        for run in (held.reference, held.run)
+    )
+    return FailuresMoved(
+        appeared=[failure for key, failure in after.items() if key not in before],
+        went=[failure for key, failure in before.items() if key not in after],
+        stayed=len(before.keys() & after.keys()),
+    )
+
+
+def _moved(held: Against) -> list[Judged]:
+    return [one for verdict in MOVED for one in held.comparison.of(verdict)]
+
+
+def _verdicts(held: Against, judged: list[Judged]) -> TextTable:
+    """The cells of `airground check`, the verdict first, under the names of both runs."""
+    header = (HEADER[0], HEADER[-1], held.reference.name, held.run.name, *HEADER[3:-1])
+    rows = [cells(one) for one in judged]
+    return TextTable(header, tuple((row[0], row[-1], *row[1:-1]) for row in rows))
+
+
+def _in_common(runs: Sequence[Run], common: bool) -> TextTable:
+    columns = [_conditions(run) | _parameters(run) for run in runs]
+    rows = []
+    for name in columns[0]:
+        values = [column[name] for column in columns]
+        if (len(set(values)) == 1) != common:
+            continue
+        if not common:
+            rows.append((name, *values))
+        elif name in _conditions(runs[0]):
+            rows.append((name, values[0]))
+    names = ("all runs",) if common else tuple(run.name for run in runs)
+    return TextTable(("", *names), tuple(rows))
+
+
+def _conditions(run: Run) -> dict[str, str]:
+    summary, measured = run.summary, run.measured
+    return {
+        "condition": measured.condition.label(),
+        "code": f"{summary.version}, revision {summary.git_revision}",
+        "flights": measured.suite,
+        "seeds of the flights": _seeds(measured.flights),
+        "--seed": str(summary.seed),
+        "machine": f"{summary.machine.cpu}, {summary.machine.cores} cores",
+    }
+
+
+def _parameters(run: Run) -> dict[str, str]:
+    """Every parameter by its name in --set."""
+    made = {}
+    for section, values in run.config.model_dump().items():
+        entries: dict[str, Any] = values if isinstance(values, dict) else {}
+        for key, value in entries.items():
+            made[f"{section}.{key}"] = str(value)
+    return made
+
+
+def _seeds(flights: Sequence[Flight]) -> str:
+    """Sorted, with runs of neighbours as ranges."""
+    seeds = sorted({flight.seed for flight in flights})
+    ranges: list[list[int]] = []
+    for seed in seeds:
+        if ranges and seed == ranges[-1][-1] + 1:
+            ranges[-1].append(seed)
+        else:
+            ranges.append([seed])
+    words = [f"{r[0]} to {r[-1]}" if len(r) > 1 else str(r[0]) for r in ranges]
+    return ", ".join(words) or MISSING

@@ -1,0 +1,157 @@
+"""A comparison in words: the same cells for the screen, for Markdown and for JUnit."""
+
+from __future__ import annotations
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from evaluation.judge.metrics import Metric
+from evaluation.judge.verdict import ALPHA, Comparison, Judged, Verdict
+
+MISSING = "-"
+HEADER = ("metric", "accepted", "now", "change", "95 % interval", "p", "compared", "verdict")
+NARROW = ("metric", "accepted", "now", "change", "verdict")
+"""What fits a terminal of 80 characters; with `WIDE` all of it does."""
+WIDE = 125
+STYLES = {
+    Verdict.WORSE: "bold red",
+    Verdict.SLIGHTLY_WORSE: "yellow",
+    Verdict.BETTER: "bold green",
+    Verdict.UNMEASURED: "dim",
+}
+MOVED = (Verdict.WORSE, Verdict.BETTER, Verdict.SLIGHTLY_WORSE, Verdict.SLIGHTLY_BETTER)
+"""In the order in which a reader wants to see them."""
+
+
+def cells(judged: Judged) -> tuple[str, ...]:
+    """One row below `HEADER`."""
+    metric, compared = judged.metric, judged.compared
+    head = (metric.title, _figure(metric, judged.before), _figure(metric, judged.after))
+    if compared is None:
+        return (*head, MISSING, MISSING, MISSING, MISSING, str(judged.verdict))
+    effect = compared.effect
+    return (
+        *head,
+        _change(metric, effect.value),
+        f"{_change(metric, effect.low)} to {_change(metric, effect.high)}",
+        _chance(judged.p),
+        _observations(judged),
+        str(judged.verdict),
+    )
+
+
+def conclusion(comparison: Comparison) -> str:
+    """One sentence that says what came out."""
+    parts = []
+    for verdict in MOVED:
+        titles = [judged.metric.title for judged in comparison.of(verdict)]
+        if titles:
+            parts.append(f"{len(titles)} {verdict}: {'; '.join(titles)}")
+    return ". ".join(parts) if parts else "No difference seen"
+
+
+def conditions(comparison: Comparison) -> str:
+    """What was compared with what, and how it was judged."""
+    pairs = "the same flights, trial by trial" if comparison.paired else "other flights"
+    text = (
+        f"{comparison.suite}; {comparison.condition.label()}; {pairs}. p is adjusted for all "
+        f"metrics (Holm); better or worse: p at most {ALPHA:g}; slightly: by less than matters."
+    )
+    if any(_taken_as_independent(judged) for judged in comparison.judged):
+        text += (
+            " * Too few flights to be the observations: single values are, taken as "
+            "independent, so trust a narrow verdict less."
+        )
+    return text
+
+
+def print_comparison(comparison: Comparison, console: Console | None = None) -> None:
+    """The table on the screen."""
+    shown = Table(
+        title=conclusion(comparison),
+        caption=conditions(comparison),
+        title_justify="left",
+        caption_justify="left",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+    )
+    console = console or Console()
+    wide = console.width >= WIDE
+    kept = [index for index, name in enumerate(HEADER) if wide or name in NARROW]
+    for index in kept:
+        left = HEADER[index] in ("metric", "verdict")
+        shown.add_column(HEADER[index], justify="left" if left else "right")
+    for judged in comparison.judged:
+        row = cells(judged)
+        shown.add_row(*(row[index] for index in kept), style=STYLES.get(judged.verdict, ""))
+    console.print(shown)
+
+
+def markdown(comparison: Comparison) -> str:
+    """The table for a pull request: what moved is on top, the rest folds away."""
+    moved = [judged for verdict in MOVED for judged in comparison.of(verdict)]
+    rest = [judged for judged in comparison.judged if judged not in moved]
+    lines = [f"**airground check: {_escaped(conclusion(comparison))}**", ""]
+    if moved:
+        lines += [*_markdown_table(moved), ""]
+    if rest:
+        lines += ["<details><summary>No difference seen, or not measured</summary>", ""]
+        lines += [*_markdown_table(rest), "", "</details>", ""]
+    return "\n".join([*lines, _escaped(conditions(comparison)), ""])
+
+
+def _markdown_table(rows: list[Judged]) -> list[str]:
+    lines = [cells(judged) for judged in rows]
+    rule = ("---", *("---:" for _ in HEADER[1:-1]), "---")
+    table = [HEADER, rule, *(tuple(map(_escaped, line)) for line in lines)]
+    return [f"| {' | '.join(line)} |" for line in table]
+
+
+def _escaped(text: str) -> str:
+    for special in ("\\", "|", "*", "_", "<"):
+        text = text.replace(special, f"\\{special}")
+    return text
+
+
+def _taken_as_independent(judged: Judged) -> bool:
+    compared = judged.compared
+    return compared is not None and not compared.by_flight and judged.metric.each != "recording"
+
+
+def _observations(judged: Judged) -> str:
+    assert judged.compared is not None
+    each = "flight" if judged.compared.by_flight else judged.metric.each
+    count = judged.compared.count
+    mark = "*" if _taken_as_independent(judged) else ""
+    return f"{count} {each}{'s' if count != 1 else ''}{mark}"
+
+
+def _figure(metric: Metric, value: float) -> str:
+    if np.isnan(value):
+        return MISSING
+    return "failed" if np.isinf(value) else _number(metric, value, "")
+
+
+def _change(metric: Metric, value: float) -> str:
+    if np.isinf(value):
+        return "fails" if value > 0 else "no longer fails"
+    return _number(metric, value, "+")
+
+
+def _number(metric: Metric, value: float, sign: str) -> str:
+    """With three digits or so, in the unit that people say."""
+    if metric.unit == "m":
+        return f"{1e3 * value:{sign}.{2 if abs(value) < 0.1 else 1}f} mm"
+    if metric.unit == "deg":
+        return f"{value:{sign}.3f}°"
+    if metric.unit == "count":
+        return f"{value:{sign}.1f}"
+    if metric.unit == "cost":
+        return f"{value:{sign}.3f}"
+    return f"{100 * value:{sign}.1f} %"
+
+
+def _chance(p: float) -> str:
+    return "< 0.001" if p < 0.001 else f"{p:.3f}"

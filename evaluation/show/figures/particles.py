@@ -1,0 +1,83 @@
+"""Fig. 8: the particles over three successive aerial maps."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse
+from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
+
+from evaluation.measure.showcase.showcase import LocalizationStep
+from evaluation.show.figures.height_maps import draw_costs, mark_truth
+from evaluation.show.figures.style import WIDE_IN, styled
+
+PARTICLES = "#35C46A"
+ZOOM_BELOW_M = 0.25
+"""Particles that spread over less are also drawn enlarged."""
+ZOOM_M = 0.3
+"""Half the side of the enlarged square."""
+
+
+@styled
+def particles_figure(steps: tuple[LocalizationStep, ...]) -> Figure:
+    """One panel a step: cost map, particles, their covariance (2 sigma), the truth."""
+    figure = Figure(figsize=(WIDE_IN, WIDE_IN / len(steps) + 0.35), layout="constrained")
+    panels = figure.subplots(1, len(steps), squeeze=False)[0]
+    for number, (axes, step) in enumerate(zip(panels, steps, strict=True), 1):
+        _draw_step(axes, step, legend=True)
+        error = float(np.linalg.norm(step.belief.estimate[:2] - step.true_u))
+        axes.set_title(f"{number}  off {error:.2f} m, spread {step.belief.spread_m:.2f} m")
+        axes.set_xlabel("x [m]")
+        if step.belief.spread_m < ZOOM_BELOW_M:
+            _zoom(axes, step)
+    panels[0].set_ylabel("y [m]")
+    panels[0].legend(loc="upper left", frameon=True, framealpha=0.9)
+    return figure
+
+
+def _draw_step(axes: Axes, step: LocalizationStep, legend: bool) -> None:
+    made, belief = step.cost_map, step.belief
+    draw_costs(axes, made.costs, made.origin, made.cells_per_m)
+    axes.plot(
+        *belief.particles[:, :2].T,
+        ".",
+        color=PARTICLES,
+        markersize=3.6,
+        markeredgewidth=0,
+        alpha=0.85,
+        label=f"{len(belief.particles)} particles" if legend else None,
+    )
+    axes.add_patch(covariance_ellipse(belief.estimate[:2], belief.covariance))
+    mark_truth(axes, step.true_u)
+
+
+def _zoom(axes: Axes, step: LocalizationStep) -> None:
+    """A square of 0.6 m around the truth, in the corner farthest from it."""
+    x, y = step.true_u
+    left, right, bottom, top = *axes.get_xlim(), *axes.get_ylim()
+    column = 0.62 if x < (left + right) / 2 else 0.02
+    row = 0.62 if y < (bottom + top) / 2 else 0.02
+    inset = axes.inset_axes((column, row, 0.36, 0.36))
+    _draw_step(inset, step, legend=False)
+    inset.set_xlim(x - ZOOM_M, x + ZOOM_M)
+    inset.set_ylim(y - ZOOM_M, y + ZOOM_M)
+    inset.set_xticks([])
+    inset.set_yticks([])
+    for spine in inset.spines.values():
+        spine.set_visible(True)
+    axes.indicate_inset_zoom(inset, edgecolor="black", alpha=0.7)
+
+
+def covariance_ellipse(mean: NDArray, covariance: NDArray, sigmas: float = 2.0) -> Ellipse:
+    """White outline of a 2-D Gaussian; widths are 2 * sigmas standard deviations."""
+    variances, axes = np.linalg.eigh(covariance)
+    width, height = 2 * sigmas * np.sqrt(np.maximum(variances, 1e-8))
+    angle = np.degrees(np.arctan2(axes[1, 0], axes[0, 0]))
+    ellipse = Ellipse(
+        tuple(mean), width, height, angle=angle, fill=False, edgecolor="white", linewidth=1.3
+    )
+    ellipse.set_path_effects([withStroke(linewidth=2.1, foreground="#555555")])
+    ellipse.set_zorder(4)
+    return ellipse

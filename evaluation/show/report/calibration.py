@@ -1,0 +1,111 @@
+"""The report's word on trust: what is claimed where, and whether the particles know their error."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from evaluation.judge.claims import (
+    ALL,
+    ELLIPSES,
+    NO_STRUCTURE,
+    TO_BE_FOUND,
+    Claims,
+    Localizations,
+    localization_claims,
+    localizations,
+    refinement_claims,
+)
+from evaluation.measure.protocol.negatives import NO_OVERLAP, WRONG_MAP
+from evaluation.setup.condition import Condition
+from evaluation.show.figures.calibration import calibration_figure
+from evaluation.show.gallery.figures import ReportFigure
+from evaluation.show.report.tables import MISSING, TextTable, rate
+from evaluation.table.rows import ResultTable
+
+TITLES = {
+    TO_BE_FOUND: "a place to find",
+    NO_STRUCTURE: "flat: nothing to tell it by",
+    NO_OVERLAP.stage: "no overlap",
+    WRONG_MAP.stage: "another scene's ground map",
+    ALL: "all together",
+}
+
+
+def claims_table(table: ResultTable) -> TextTable:
+    """One row a case (of one condition); no rows where nothing was asked."""
+    located, refined = localization_claims(table), refinement_claims(table)
+    rows = [
+        (title, *_cells(located.get(case)), *_cells(refined.get(case)))
+        for case, title in TITLES.items()
+        if case in located or case in refined
+    ]
+    header = (
+        "case",
+        "localizations",
+        "claim a position",
+        "wrong claims",
+        "refinements",
+        "accepted",
+        "wrongly",
+    )
+    return TextTable(header, tuple(rows))
+
+
+def _cells(claims: Claims | None) -> tuple[str, str, str]:
+    if claims is None:
+        return "0", MISSING, MISSING
+    return str(claims.accepted.total), rate(claims.accepted), rate(claims.wrong)
+
+
+def calibration_table(table: ResultTable) -> TextTable:
+    """All beliefs beside those that claim a position; no rows where there is none."""
+    found = localizations(table)
+    if len(found) == 0:
+        return TextTable((), ())
+    parts = (found, found.only_accepted())
+    rows = [("localizations", *(str(len(part)) for part in parts))]
+    rows += [
+        (
+            f"true position in the {100 * share:.0f} % ellipse",
+            *(rate(part.coverage(share)) for part in parts),
+        )
+        for share in ELLIPSES
+    ]
+    for title, read in (
+        ("normalized error, mean", Localizations.mean_normalized_error),
+        ("normalized error, median", Localizations.median_normalized_error),
+        ("rank correlation of spread and error", Localizations.rank_correlation),
+    ):
+        rows.append((title, *(_ratio(read(part)) for part in parts)))
+    return TextTable(("", "all", "accepted"), tuple(rows))
+
+
+def calibration_figures(table: ResultTable, condition: Condition) -> Iterator[ReportFigure]:
+    """Of one condition, control scenes apart; nothing where there is no belief."""
+    found = localizations(table)
+    if len(found):
+        yield ReportFigure(
+            "calibration",
+            "Calibration: does the spread tell the error?",
+            "Left: how often the true position lies in the ellipse of the particles' covariance "
+            "around the reported position, with 95 % Wilson intervals at 50, 90 and 99 %. Below "
+            "the dashed line, particles are surer than they should be. Right: error and spread of "
+            "each localization. Aerial maps of one sequence are not independent. "
+            f"{_beyond(found)}{condition.label()}.",
+            calibration_figure(found),
+        )
+
+
+def _beyond(found: Localizations) -> str:
+    collapsed = int(np.isinf(found.squared_mahalanobis).sum())
+    if collapsed == 0:
+        return ""
+    return f"{collapsed} beliefs had all particles in one place: in no ellipse. "
+
+
+def _ratio(value: float) -> str:
+    if np.isnan(value):
+        return MISSING
+    return f"{value:.2f}" if np.isfinite(value) else "infinite"

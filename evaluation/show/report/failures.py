@@ -1,0 +1,154 @@
+"""What went wrong, and what was rightly refused."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from evaluation.setup.condition import Condition
+from evaluation.show.report.tables import MISSING, TextTable, degrees, metres
+from evaluation.table.rows import SEQUENCE_KEYS, ResultTable
+
+JUDGED_AFTER, LOCATED_M = 4, 0.25
+"""A sequence farther off than this after so many aerial maps failed."""
+REFINED_M, REFINED_DEG = 0.05, 2.0
+
+
+@dataclass(frozen=True)
+class Failure:
+    """One sequence that did not find its place, or one refinement that did not end there.
+
+    Attributes:
+        kind: "sequence" or "refinement".
+        scene, seed, flight, number: Which one.
+        result: How it ended.
+        said: What the pipeline said of it.
+        story: Step by step, for who wants to know more.
+    """
+
+    kind: str
+    scene: str
+    seed: int
+    flight: int
+    number: int
+    result: str
+    said: str
+    story: TextTable
+
+    @property
+    def key(self) -> tuple[str, str, int, int, int]:
+        """What names the same trial in another run."""
+        return self.kind, self.scene, self.seed, self.flight, self.number
+
+    @property
+    def title(self) -> str:
+        where = f"{self.scene}, seed {self.seed}, flight {self.flight}"
+        return f"{self.kind} {self.number} of {where}"
+
+
+def control_table(table: ResultTable, conditions: Sequence[Condition]) -> TextTable:
+    """Control scenes: there the only right answer is to claim nothing."""
+    rows = []
+    for condition in conditions:
+        part = table.of(condition).controls()
+        converged = part.sequences("converged")
+        if len(converged) == 0:
+            continue
+        ever = np.nanmax(converged.to_numpy(np.float64), axis=1) > 0
+        notes = part.rows("localization", "converged")["note"]
+        said = notes[notes != ""].value_counts()
+        reason = f"{said.index[0]} ({said.iloc[0]} of {len(notes)} updates)" if len(said) else ""
+        rows.append(
+            (
+                ", ".join(part.scenes()),
+                condition.label(),
+                f"{int(ever.sum())} of {len(ever)}",
+                reason or MISSING,
+            )
+        )
+    header = ("scene", "condition", "ever claimed a position", "why not, mostly")
+    return TextTable(header, tuple(rows))
+
+
+def failures(table: ResultTable) -> list[Failure]:
+    """Every failure of one condition: sequences beyond 0.25 m after 4, refinements off."""
+    return [*_failed_sequences(table), *_failed_trials(table)]
+
+
+def _failed_sequences(table: ResultTable) -> Iterator[Failure]:
+    errors, spreads = table.sequences("error_m"), table.sequences("spread_m")
+    if len(errors) == 0:
+        return
+    judged = min(JUDGED_AFTER, errors.shape[1])
+    notes = table.rows("localization", "converged").set_index([*SEQUENCE_KEYS, "iteration"])["note"]
+    for key, error, spread in zip(
+        errors.index.to_list(),
+        errors.to_numpy(np.float64),
+        spreads.to_numpy(np.float64),
+        strict=True,
+    ):
+        if error[judged - 1] <= LOCATED_M:
+            continue
+        said = [
+            str(notes.get((*key, n), "")) or "position claimed" for n in range(1, len(error) + 1)
+        ]
+        steps = tuple(
+            (str(n), _off(off), metres(wide), words)
+            for n, (off, wide, words) in enumerate(zip(error, spread, said, strict=True), 1)
+        )
+        result = f"{_off(error[judged - 1])} after {judged}"
+        if len(error) > judged:
+            result += f", {_off(error[-1])} after {len(error)}"
+        scene, seed, flight, sequence = key
+        yield Failure(
+            "sequence",
+            str(scene),
+            int(seed),
+            int(flight),
+            int(sequence),
+            result,
+            said[judged - 1],
+            TextTable(("aerial map", "error", "spread", "said"), steps),
+        )
+
+
+def _failed_trials(table: ResultTable) -> Iterator[Failure]:
+    trials = table.trials()
+    if "after_translation_m" not in trials:
+        return
+    rows = table.rows("refinement", "accepted")
+    notes = rows.set_index(["scene", "seed", "flight", "trial"])["note"]
+    for key, trial in zip(trials.index.to_list(), trials.to_dict("records"), strict=True):
+        accepted = trial.get("accepted", 1.0) > 0
+        off_m, off_deg = trial["after_translation_m"], trial["after_rotation_deg"]
+        if accepted and off_m <= REFINED_M and off_deg <= REFINED_DEG:
+            continue
+        scene, seed, flight, _, number = key
+        steps = tuple(
+            (title, _off(trial[f"{when}_translation_m"]), degrees(trial[f"{when}_rotation_deg"]))
+            for when, title in _MOMENTS
+            if f"{when}_translation_m" in trial
+        )
+        yield Failure(
+            "refinement",
+            str(scene),
+            int(seed),
+            int(flight),
+            int(number),
+            f"{_off(off_m)}, {degrees(off_deg)}",
+            "accepted" if accepted else f"refused: {notes.get((scene, seed, flight, number), '')}",
+            TextTable(("when", "position error", "angle error"), steps),
+        )
+
+
+_MOMENTS = (
+    ("before", "at the start"),
+    ("after", "after refinement"),
+    ("from_truth", "the same, started at the truth"),
+)
+
+
+def _off(metres_off: float) -> str:
+    return metres(metres_off) if np.isfinite(metres_off) else "no estimate"

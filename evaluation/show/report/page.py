@@ -1,0 +1,138 @@
+"""`report.html`: one self-contained page to show a colleague, and the figures beside it."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
+from PIL import Image
+
+from evaluation.judge.results import CONFIG, SHOWCASE, SUMMARY, TABLE, Results
+from evaluation.judge.summary import Summary, build_summary
+from evaluation.measure.showcase.showcase import Showcase
+from evaluation.setup import published
+from evaluation.setup.condition import Condition, shared_parts
+from evaluation.setup.run_info import RunInfo
+from evaluation.setup.settings import write_config
+from evaluation.show.figures.style import save_figure
+from evaluation.show.gallery.figures import ReportFigure
+from evaluation.show.report.baselines import baseline_table
+from evaluation.show.report.calibration import calibration_table, claims_table
+from evaluation.show.report.error_budget import budget_table
+from evaluation.show.report.failures import control_table, failures
+from evaluation.show.report.figures import report_figures
+from evaluation.show.report.headline import headlines
+from evaluation.show.report.screen import live_table
+from evaluation.show.report.tables import comparison_table, scene_table, timing_table
+from evaluation.show.report.trajectories import trajectory_table
+from evaluation.table.rows import ResultTable
+
+
+def write_results(results: Results, folder: Path) -> Summary:
+    """Write table, summary, configuration, report and figures into an existing folder."""
+    run = RunInfo.here(results.seed)
+    summary = build_summary(results.table, results.table.conditions()[0], run)
+    results.table.write(folder / TABLE)
+    write_config(results.config, folder / CONFIG)
+    if results.showcase is not None:
+        results.showcase.save(folder / SHOWCASE)
+    write_report(folder, results.table, results.showcase, run, notes=results.notes)
+    summary.write(folder / SUMMARY)
+    return summary
+
+
+def write_report(
+    out: Path,
+    table: ResultTable,
+    showcase: Showcase | None,
+    run: RunInfo,
+    conditions: Sequence[Condition] | None = None,
+    notes: Sequence[str] = (),
+) -> None:
+    """Write `report.html` and `figures/` (PNG and PDF) into `out`.
+
+    Args:
+        out: Folder of the run; made where missing.
+        table: Everything that was measured.
+        showcase: What the pictures are drawn from; None leaves them out.
+        run: Where the results come from.
+        conditions: What to show, the primary one first; None shows all of the table. The
+            primary one, those of the other preset and then the rest are drawn side by side
+            (four at most); all stand in the comparison.
+        notes: Sentences for "What to know": what missed its mark and why.
+    """
+    shown = list(conditions) if conditions is not None else table.conditions()
+    primary = table.of(shown[0])
+    measured = primary.without_controls()
+    page = rendered(
+        "report.html.j2",
+        condition=shown[0].label(),
+        scenes=measured.scenes(),
+        run=run,
+        headlines=headlines(measured, run.seed),
+        comparison=comparison_table(table, shown),
+        shared=shared_parts(shown) if len(shown) > 1 else shown[0].label(),
+        pictures=[saved_picture(f, out) for f in report_figures(table, shown, showcase)],
+        trajectories=trajectory_table(table, shown),
+        budget=budget_table(measured),
+        baselines=baseline_table(primary),
+        claims=claims_table(primary),
+        calibration=calibration_table(measured),
+        timing=timing_table(measured),
+        live=live_table(measured),
+        by_scene=scene_table(primary),
+        controls=control_table(table, shown),
+        failures=failures(measured),
+        notes=list(notes),
+        platform=published.PLATFORM,
+    )
+    (out / "report.html").write_text(page, encoding="utf-8")
+
+
+PICTURE_WIDTH_PX = 1500
+WEBP_QUALITY = 88
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure as a page embeds it."""
+
+    name: str
+    title: str
+    caption: str
+    wide: bool
+    data_uri: str
+    width: int
+    height: int
+
+
+def saved_picture(drawn: ReportFigure, out: Path) -> Picture:
+    """Save a figure into `figures/` of a folder, and pack it for the page."""
+    save_figure(drawn.figure, out / "figures", drawn.name)
+    with Image.open(out / "figures" / f"{drawn.name}.png") as opened:
+        image = opened.convert("RGB")
+    if image.width > PICTURE_WIDTH_PX:
+        height = round(image.height * PICTURE_WIDTH_PX / image.width)
+        image = image.resize((PICTURE_WIDTH_PX, height), Image.Resampling.LANCZOS)
+    packed = io.BytesIO()
+    image.save(packed, "WEBP", quality=WEBP_QUALITY, method=4)
+    data_uri = "data:image/webp;base64," + base64.b64encode(packed.getvalue()).decode("ascii")
+    return Picture(
+        drawn.name, drawn.title, drawn.caption, drawn.wide, data_uri, image.width, image.height
+    )
+
+
+def rendered(template: str, **words: object) -> str:
+    """A template of this folder, filled; all text is escaped."""
+    environment = Environment(
+        loader=PackageLoader("evaluation.show", "report"),
+        autoescape=select_autoescape(["html", "j2"]),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template(template).render(**words)

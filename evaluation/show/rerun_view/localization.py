@@ -1,0 +1,167 @@
+"""The two height maps, the cost of every position, and the particles on it (Fig. 7, 8)."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+
+from airground.core.belief import Belief, CostMap, HeightMap
+from airground.core.events import BeliefUpdated, CostMapComputed, HeightMapsMade
+from evaluation.run.onlooker import Seen
+from evaluation.show.figures.particles import PARTICLES
+from evaluation.show.figures.style import COST_COLOURS, HEIGHT_COLOURS
+from evaluation.show.rerun_view.depth_maps import cell_pixels, coloured, rgb, upright
+from evaluation.show.rerun_view.sensor_stream import COSTS, TRUTH, SensorStream
+from evaluation.table.truth_errors import true_T_ground_mav
+from sim.recording.truth import Truth
+
+ROOM = "localization"
+TRUE_POSITION = f"{TRUTH}/position"
+SIGMAS = 2.0
+"""The ellipse's half axes, in standard deviations."""
+ELLIPSE_STEPS = 48
+WHITE, TRUTH_COLOUR = (255, 255, 255), (255, 60, 200)
+CROSS_PX = 7.0
+ROOM_TO_GROW = 1.3
+"""Side of all pictures of aerial height maps, in sides of the first map."""
+
+
+class Localization:
+    """What the particle filter works on and believes.
+
+    Args:
+        stream: To draw on.
+        truth: Where given, the true position is drawn too.
+    """
+
+    def __init__(self, stream: SensorStream, truth: Truth | None) -> None:
+        self._stream, self._truth = stream, truth
+        self._cost_map: CostMap | None = None
+        self._heights: HeightMapsMade | None = None
+        self._aerial_cells: int | None = None
+        drawn = ("particles", "covariance", "estimate", "verdict")
+        parts = [f"{ROOM}/costs/{part}" for part in drawn]
+        stream.put_in_frame(COSTS, f"{ROOM}/costs", *parts)
+        if truth is not None:
+            stream.put_in_frame(COSTS, TRUE_POSITION)
+
+    def see(self, seen: Seen) -> None:
+        """Draw what localization was given, and what it concluded."""
+        stamp_ns = seen.event.stamp_ns
+        match seen.event:
+            case HeightMapsMade():
+                self._heights = seen.event
+            case CostMapComputed(cost_map=cost_map):
+                self._cost_map = cost_map
+                self._stream.log(stamp_ns, f"{ROOM}/costs", cost_picture(cost_map))
+            case BeliefUpdated(belief=belief) if self._cost_map is not None:
+                self._draw_heights(stamp_ns, self._cost_map)
+                self._draw_belief(stamp_ns, belief, self._cost_map)
+                self._draw_truth(stamp_ns, seen, self._cost_map)
+
+    def _draw_heights(self, stamp_ns: int, cost_map: CostMap) -> None:
+        """The aerial map around its camera, the ground map where there are costs.
+
+        The viewer takes pictures that come under one name for a video: all have one size.
+        """
+        assert self._heights is not None
+        aerial, ground = self._heights.aerial, self._heights.ground
+        if self._aerial_cells is None:
+            self._aerial_cells = round(ROOM_TO_GROW * max(aerial.heights.shape))
+        side = self._aerial_cells
+        corner = np.full(2, -(side // 2) / aerial.cells_per_m)
+        picture = height_picture(cut_out(aerial, corner, (side, side)))
+        self._stream.log(stamp_ns, f"{ROOM}/aerial_heights", picture)
+        picture = height_picture(cut_out(ground, cost_map.origin, cost_map.costs.shape))
+        self._stream.log(stamp_ns, f"{ROOM}/ground_heights", picture)
+
+    def _draw_belief(self, stamp_ns: int, belief: Belief, cost_map: CostMap) -> None:
+        particles = on_costs(belief.particles[:, :2], cost_map)
+        ellipse = on_costs(ellipse_points(belief.estimate[:2], belief.covariance), cost_map)
+        radius = rr.Radius.ui_points(2.0)
+        green = rr.Points2D(particles, colors=[rgb(PARTICLES)], radii=radius, draw_order=20)
+        outline = rr.LineStrips2D(
+            [ellipse], colors=[WHITE], radii=rr.Radius.ui_points(1.5), draw_order=30
+        )
+        said = f"spread {belief.spread_m:.2f} m" if belief.converged else "position refused"
+        estimate = rr.Points2D(
+            on_costs(belief.estimate[None, :2], cost_map),
+            colors=[WHITE],
+            radii=rr.Radius.ui_points(1.0),
+            draw_order=31,
+        )
+        columns, rows = cost_map.costs.shape
+        verdict = rr.Points2D(
+            [[columns / 2, 0.88 * rows]],
+            colors=[WHITE],
+            radii=rr.Radius.ui_points(0.5),
+            labels=[said],
+            show_labels=True,
+        )
+        self._stream.log(stamp_ns, f"{ROOM}/costs/particles", green)
+        self._stream.log(stamp_ns, f"{ROOM}/costs/covariance", outline)
+        self._stream.log(stamp_ns, f"{ROOM}/costs/estimate", estimate)
+        self._stream.log(stamp_ns, f"{ROOM}/costs/verdict", verdict)
+
+    def _draw_truth(self, stamp_ns: int, seen: Seen, cost_map: CostMap) -> None:
+        if self._truth is None or seen.sighting is None:
+            return
+        true = true_T_ground_mav(seen.sighting, self._truth)
+        true_u = (true @ seen.sighting.surface.T_mav_camera.translation)[:2]
+        middle = on_costs(true_u[None], cost_map)[0]
+        arms = CROSS_PX * np.array([[[-1, 0], [1, 0]], [[0, -1], [0, 1]]], np.float32)
+        cross = rr.LineStrips2D(
+            list(middle + arms),
+            colors=[TRUTH_COLOUR],
+            radii=rr.Radius.ui_points(1.5),
+            draw_order=40,
+        )
+        self._stream.log(stamp_ns, TRUE_POSITION, cross)
+
+
+def height_picture(made: HeightMap) -> rr.EncodedImage:
+    """Heights, walls and other rare ones clipped."""
+    low, high = _limits(made.heights, 1, 97)
+    return coloured(upright(made.heights), HEIGHT_COLOURS, low, max(high, low + 0.05))
+
+
+def cut_out(made: HeightMap, corner: NDArray, shape: tuple[int, ...]) -> HeightMap:
+    """The part of a map with `shape[0]` by `shape[1]` cells from `corner` [m]; NaN beyond it."""
+    cells = np.full(shape, np.nan, np.float32)
+    shift = np.rint((np.asarray(corner) - made.origin) * made.cells_per_m).astype(int)
+    first = np.maximum(shift, 0)
+    last = np.minimum(shift + np.array(shape), made.heights.shape)
+    if (first < last).all():
+        to, end = first - shift, last - shift
+        cells[to[0] : end[0], to[1] : end[1]] = made.heights[first[0] : last[0], first[1] : last[1]]
+    return HeightMap(cells, made.origin + shift / made.cells_per_m, made.cells_per_m)
+
+
+def cost_picture(cost_map: CostMap) -> rr.EncodedImage:
+    """Low is dark, as in the paper; the worst tenth is clipped."""
+    low, high = _limits(cost_map.costs, 0, 90)
+    return coloured(upright(cost_map.costs), COST_COLOURS, low, high)
+
+
+def on_costs(points_ground: NDArray, cost_map: CostMap) -> NDArray[np.float32]:
+    """(N, 2) pixels of the cost map's picture for points (N, 2) in `ground` [m]."""
+    rows = cost_map.costs.shape[1]
+    return cell_pixels(points_ground, cost_map.origin, cost_map.cells_per_m, rows)
+
+
+def ellipse_points(mean: NDArray, covariance: NDArray) -> NDArray[np.float64]:
+    """(N, 2) a closed line around a 2-D Gaussian, `SIGMAS` standard deviations from its mean."""
+    variances, axes = np.linalg.eigh(covariance)
+    angle = np.linspace(0, 2 * np.pi, ELLIPSE_STEPS + 1)
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return mean + SIGMAS * (circle * np.sqrt(np.maximum(variances, 0))) @ axes.T
+
+
+def _limits(cells: NDArray, low: float, high: float) -> tuple[float, float]:
+    """Percentiles of what is there."""
+    finite = cells[np.isfinite(cells)]
+    if len(finite) == 0:
+        return 0.0, 1.0
+    lowest, highest = np.percentile(finite, [low, high])
+    return float(lowest), float(highest)

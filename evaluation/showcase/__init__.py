@@ -1,1 +1,0 @@
-"""One flight looked at closely, and the pictures drawn from it."""

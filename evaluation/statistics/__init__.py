@@ -1,1 +1,0 @@
-"""Intervals that keep failures, and comparisons of two sets of results."""

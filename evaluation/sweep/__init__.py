@@ -1,1 +1,0 @@
-"""Sweeps: what is measured when a dial is turned."""

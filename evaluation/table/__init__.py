@@ -1,0 +1,1 @@
+"""Rows of results, their statistics, and the truth that they are measured against."""

@@ -1,0 +1,113 @@
+"""Writes result rows of one recording under one condition."""
+
+from __future__ import annotations
+
+from airground.core.belief import Alignment, Belief
+from evaluation.setup.condition import Condition
+from evaluation.table.rows import Row
+from evaluation.table.truth_errors import PoseError
+
+
+class RowWriter:
+    """Collects rows that share their recording and their condition.
+
+    Args:
+        scene, seed, flight: Which recording.
+        condition: Under what it is measured.
+    """
+
+    def __init__(self, scene: str, seed: int, flight: int, condition: Condition) -> None:
+        self.rows: list[Row] = []
+        self._recording = (scene, seed, flight)
+        self._condition = condition
+
+    def add(
+        self,
+        stage: str,
+        metric: str,
+        value: float,
+        unit: str,
+        *,
+        sequence: int | None = None,
+        iteration: int | None = None,
+        trial: int | None = None,
+        time_s: float | None = None,
+        note: str = "",
+    ) -> None:
+        """One row; see `Row` for what the words mean."""
+        scene, seed, flight = self._recording
+        self.rows.append(
+            Row(
+                scene=scene,
+                seed=seed,
+                flight=flight,
+                condition=self._condition,
+                stage=stage,
+                metric=metric,
+                value=float(value),
+                unit=unit,
+                sequence=sequence,
+                iteration=iteration,
+                trial=trial,
+                note=note,
+                time_s=time_s,
+            )
+        )
+
+    def add_belief(
+        self,
+        belief: Belief,
+        error: PoseError,
+        squared_mahalanobis: float,
+        sequence: int,
+        iteration: int,
+    ) -> None:
+        """What a filter says after one aerial map, and how far off it is (Fig. 11, 12)."""
+        for metric, value, unit in (
+            ("error_m", error.horizontal_m, "m"),
+            ("error_deg", error.rotation_deg, "deg"),
+            ("spread_m", belief.spread_m, "m"),
+            ("squared_mahalanobis", squared_mahalanobis, ""),
+            ("converged", belief.converged, ""),
+        ):
+            note = belief.refusal if metric == "converged" else ""
+            self.add(
+                "localization",
+                metric,
+                value,
+                unit,
+                sequence=sequence,
+                iteration=iteration,
+                note=note,
+            )
+
+    def add_no_belief(self, reason: str, sequence: int, iteration: int) -> None:
+        """An aerial map that never came: counts as failed."""
+        nothing = float("nan")
+        for metric, value, unit in (
+            ("error_m", nothing, "m"),
+            ("error_deg", nothing, "deg"),
+            ("converged", 0.0, ""),
+        ):
+            self.add(
+                "localization",
+                metric,
+                value,
+                unit,
+                sequence=sequence,
+                iteration=iteration,
+                note=reason,
+            )
+
+    def add_alignment(
+        self, alignment: Alignment, errors: dict[str, PoseError], duration_ms: float, trial: int
+    ) -> None:
+        """A refinement (Fig. 13, 14): errors by when, "before" and "after" among them."""
+        for when, error in errors.items():
+            metric = f"{when}_translation_m"
+            self.add("refinement", metric, error.translation_m, "m", trial=trial)
+            metric = f"{when}_rotation_deg"
+            self.add("refinement", metric, error.rotation_deg, "deg", trial=trial)
+        accepted, refusal = alignment.accepted, alignment.refusal
+        self.add("refinement", "accepted", accepted, "", trial=trial, note=refusal)
+        self.add("timing", "icp", duration_ms, "ms", trial=trial)

@@ -1,0 +1,183 @@
+"""One row per measured thing: what experiments write and reports read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from airground.errors import InputError
+from evaluation.setup.condition import Condition
+
+CONTROL_SCENES = frozenset({"flat"})
+"""Scenes without structure, in which the right answer is to claim nothing."""
+
+CLOCK_STAGES = frozenset({"timing", "run"})
+"""Stages whose rows depend on the machine and on what else it does."""
+
+LIVE_STAGE = "realtime"
+"""Of rows that only a live run writes."""
+SEQUENCE_KEYS = ["scene", "seed", "flight", "sequence"]
+TRIAL_KEYS = ["scene", "seed", "flight", "sequence", "trial"]
+
+_DTYPES = {
+    "scene": "string",
+    "seed": "Int64",
+    "flight": "Int64",
+    "preset": "string",
+    "poses": "string",
+    "sensors": "string",
+    "heading": "string",
+    "variant": "string",
+    "sequence": "Int64",
+    "iteration": "Int64",
+    "trial": "Int64",
+    "stage": "string",
+    "metric": "string",
+    "value": "float64",
+    "unit": "string",
+    "note": "string",
+    "time_s": "float64",
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One measured thing.
+
+    Attributes:
+        scene, seed, flight: Which recording it comes from.
+        condition: Under what it was measured.
+        stage, metric, value, unit: What was measured; a value that a failure left without
+            a number is NaN.
+        sequence, iteration, trial: Which one it was, where that applies; iterations
+            count from 1.
+        note: Why, in words: the reason of a refusal.
+        time_s: When in the recording, where something is measured over time [s].
+    """
+
+    scene: str
+    seed: int
+    flight: int
+    condition: Condition
+    stage: str
+    metric: str
+    value: float
+    unit: str
+    sequence: int | None = None
+    iteration: int | None = None
+    trial: int | None = None
+    note: str = ""
+    time_s: float | None = None
+
+    def as_record(self) -> dict[str, object]:
+        record = {k: v for k, v in self.__dict__.items() if k != "condition"}
+        return record | asdict(self.condition)
+
+
+@dataclass(frozen=True, eq=False)
+class ResultTable:
+    """Rows of measurements as a data frame with fixed columns; treat it as read-only."""
+
+    frame: pd.DataFrame
+
+    def __post_init__(self) -> None:
+        missing = [name for name in _DTYPES if name not in self.frame.columns]
+        if missing:
+            raise InputError(f"results: column {missing[0]!r} is missing; expected {list(_DTYPES)}")
+        frame = self.frame[list(_DTYPES)].astype(_DTYPES).reset_index(drop=True)
+        object.__setattr__(self, "frame", frame)
+
+    @classmethod
+    def from_rows(cls, rows: Iterable[Row]) -> ResultTable:
+        return cls(pd.DataFrame.from_records([r.as_record() for r in rows], columns=list(_DTYPES)))
+
+    @classmethod
+    def concat(cls, tables: Sequence[ResultTable]) -> ResultTable:
+        return cls(pd.concat([table.frame for table in tables], ignore_index=True))
+
+    @classmethod
+    def read(cls, path: Path) -> ResultTable:
+        """Read `results.parquet`.
+
+        Raises:
+            InputError: The file is missing, no parquet, or lacks a column.
+        """
+        try:
+            frame = pd.read_parquet(path)
+        except (OSError, ValueError) as error:
+            raise InputError(f"{path}: no readable results table ({error})") from error
+        return cls(frame)
+
+    def write(self, path: Path) -> None:
+        self.frame.to_parquet(path, index=False)
+
+    def __len__(self) -> int:
+        return len(self.frame)
+
+    def conditions(self) -> list[Condition]:
+        """Every condition, in the order of first appearance."""
+        columns = list(Condition.__dataclass_fields__)
+        unique = self.frame[columns].drop_duplicates()
+        return [Condition(*map(str, row)) for row in unique.itertuples(index=False)]
+
+    def scenes(self) -> list[str]:
+        return [str(scene) for scene in self.frame["scene"].unique()]
+
+    def of(self, condition: Condition) -> ResultTable:
+        """The rows measured under one condition."""
+        keep = pd.Series(True, index=self.frame.index)
+        for column, value in asdict(condition).items():
+            keep &= self.frame[column] == value
+        return ResultTable(self.frame[keep])
+
+    def of_scenes(self, scenes: Iterable[str]) -> ResultTable:
+        return ResultTable(self.frame[self.frame["scene"].isin(list(scenes))])
+
+    def without(self, stages: Iterable[str]) -> ResultTable:
+        """Without the rows of some stages."""
+        return ResultTable(self.frame[~self.frame["stage"].isin(list(stages))])
+
+    def without_controls(self) -> ResultTable:
+        """Without the control scenes, unless there are no others.
+
+        Where there is nothing to find, being lost is no failure; such scenes are judged by
+        `controls` instead.
+        """
+        others = [scene for scene in self.scenes() if scene not in CONTROL_SCENES]
+        return self.of_scenes(others) if others else self
+
+    def controls(self) -> ResultTable:
+        """Only the control scenes."""
+        return self.of_scenes(CONTROL_SCENES)
+
+    def rows(self, stage: str, metric: str) -> pd.DataFrame:
+        return self.frame[(self.frame["stage"] == stage) & (self.frame["metric"] == metric)]
+
+    def values(self, stage: str, metric: str) -> NDArray[np.float64]:
+        """(N,) every value of one metric, in the order of the table."""
+        return self.rows(stage, metric)["value"].to_numpy(np.float64)
+
+    def sequences(self, metric: str) -> pd.DataFrame:
+        """A localization metric per sequence (rows) and iteration (columns 1, 2, ...).
+
+        Every sequence of which the table says anything has a row, and every iteration up
+        to the longest sequence's a column; what was not measured is NaN.
+        """
+        frame = self.frame[self.frame["stage"] == "localization"]
+        keys = frame[SEQUENCE_KEYS].drop_duplicates()
+        last = frame["iteration"].max()
+        columns = range(1, 1 if pd.isna(last) else int(last) + 1)
+        wanted = frame[frame["metric"] == metric]
+        wide = wanted.pivot(index=SEQUENCE_KEYS, columns="iteration", values="value")
+        return wide.reindex(index=pd.MultiIndex.from_frame(keys), columns=columns)
+
+    def trials(self) -> pd.DataFrame:
+        """The refinement's metrics per trial: one row a trial, one column a metric."""
+        frame = self.frame[self.frame["stage"] == "refinement"]
+        keyed = frame.assign(**{key: frame[key].fillna(-1) for key in TRIAL_KEYS[1:]})
+        return keyed.pivot(index=TRIAL_KEYS, columns="metric", values="value")

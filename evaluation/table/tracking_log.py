@@ -1,0 +1,206 @@
+"""What front ends answered, image by image, and how long they took."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.messages import GroundImage, ImuSamples, MavImage
+from airground.core.se3 import SE3
+from airground.core.trajectory import Trajectory
+from airground.slam.front_end import FrontEnd, ScaleEstimate, TrackedPose, Tracking
+
+RECORDS_A_CHUNK = 1024
+_STATES = tuple(Tracking)
+_RECORD = np.dtype(
+    [
+        ("stamp_ns", np.int64),
+        ("tracking", np.uint8),
+        ("corrected", np.bool_),
+        ("rotation", np.float64, (3, 3)),
+        ("translation", np.float64, (3,)),
+        ("has_covariance", np.bool_),
+        ("covariance", np.float64, (6, 6)),
+        ("has_scale", np.bool_),
+        ("scale_sigma", np.float64),
+        ("scale_observable", np.bool_),
+        ("has_depth_range", np.bool_),
+        ("depth_range", np.float64, (2,)),
+    ]
+)
+
+
+class AnswerLog(Sequence[TrackedPose]):
+    """Answers in order of time, without their corners; each is made anew when it is asked for.
+
+    As objects they took 3.3 kB each, which in ten minutes of two robots is 120 MB.
+
+    Args:
+        answers: The first ones.
+    """
+
+    def __init__(self, answers: Iterable[TrackedPose] = ()) -> None:
+        self._chunks: list[NDArray[np.void]] = []
+        self._count = 0
+        for answer in answers:
+            self.append(answer)
+
+    def append(self, answer: TrackedPose) -> None:
+        """Keep one more."""
+        at = self._count % RECORDS_A_CHUNK
+        if at == 0:
+            self._chunks.append(np.zeros(RECORDS_A_CHUNK, _RECORD))
+        record = self._chunks[-1][at]
+        record["stamp_ns"] = answer.stamp_ns
+        record["tracking"] = _STATES.index(answer.tracking)
+        record["corrected"] = answer.corrected
+        if answer.T_map_camera is not None:
+            record["rotation"] = answer.T_map_camera.rotation
+            record["translation"] = answer.T_map_camera.translation
+        if answer.covariance is not None:
+            record["has_covariance"], record["covariance"] = True, answer.covariance
+        if answer.scale is not None:
+            record["has_scale"], record["scale_sigma"] = True, answer.scale.sigma
+            record["scale_observable"] = answer.scale.observable
+        if answer.depth_range is not None:
+            record["has_depth_range"], record["depth_range"] = True, answer.depth_range
+        self._count += 1
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, index: int) -> TrackedPose: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[TrackedPose]: ...
+    def __getitem__(self, index: int | slice) -> TrackedPose | list[TrackedPose]:
+        if isinstance(index, slice):
+            return [self._answer(at) for at in range(*index.indices(self._count))]
+        at = index + self._count if index < 0 else index
+        if not 0 <= at < self._count:
+            raise IndexError(f"answer {index} of {self._count}")
+        return self._answer(at)
+
+    def _answer(self, at: int) -> TrackedPose:
+        record = self._chunks[at // RECORDS_A_CHUNK][at % RECORDS_A_CHUNK]
+        tracking = _STATES[record["tracking"]]
+        pose = covariance = scale = depth_range = None
+        # Copies: a view would keep its whole chunk alive.
+        if tracking is Tracking.TRACKED:
+            pose = SE3(record["rotation"].copy(), record["translation"].copy())
+        if record["has_covariance"]:
+            covariance = record["covariance"].copy()
+        if record["has_scale"]:
+            sigma, observable = record["scale_sigma"], record["scale_observable"]
+            scale = ScaleEstimate(float(sigma), bool(observable))
+        if record["has_depth_range"]:
+            near, far = record["depth_range"].tolist()
+            depth_range = near, far
+        return TrackedPose(
+            int(record["stamp_ns"]),
+            tracking,
+            pose,
+            covariance,
+            scale,
+            depth_range,
+            bool(record["corrected"]),
+        )
+
+
+Image = TypeVar("Image", MavImage, GroundImage)
+
+
+@dataclass
+class FrontEndLog:
+    """What a front end said.
+
+    Attributes:
+        answers: One an image, in order of time, without corners.
+        durations_ms: Of each image with the inertial samples before it, mapping included,
+            decoding not.
+    """
+
+    answers: AnswerLog = field(default_factory=AnswerLog)
+    durations_ms: list[float] = field(default_factory=list)
+
+    def live_poses(self) -> list[tuple[int, SE3]]:
+        """Stamp and pose of each tracked image, as they were said at its time."""
+        return [(a.stamp_ns, a.T_map_camera) for a in self.answers if a.T_map_camera is not None]
+
+    def since_tracking(self) -> list[TrackedPose]:
+        """The answers from the first tracked image on; none where there is no such image."""
+        for first, answer in enumerate(self.answers):
+            if answer.tracking is Tracking.TRACKED:
+                return self.answers[first:]
+        return []
+
+
+class WatchedFrontEnd(FrontEndLog, Generic[Image]):
+    """Passes everything on, and keeps the answers and their times.
+
+    Args:
+        inner: Who really tracks.
+        clock: Tells the time [s].
+    """
+
+    def __init__(
+        self, inner: FrontEnd[Image], clock: Callable[[], float] = time.perf_counter
+    ) -> None:
+        super().__init__()
+        self._inner: FrontEnd[Image] = inner
+        self._clock = clock
+        self._imu_s = 0.0
+
+    def add_imu(self, samples: ImuSamples) -> None:
+        """Pass inertial measurements on."""
+        started = self._clock()
+        self._inner.add_imu(samples)
+        self._imu_s += self._clock() - started
+
+    def track(self, image: Image) -> TrackedPose:
+        """Pass an image on."""
+        started = self._clock()
+        answer = self._inner.track(image)
+        self.durations_ms.append(1e3 * (self._clock() - started + self._imu_s))
+        self._imu_s = 0.0
+        self.answers.append(answer)
+        return answer
+
+    def finish(self) -> None:
+        """Let it finish."""
+        self._inner.finish()
+
+    def trajectory(self) -> Trajectory | None:
+        """The poses that it believes in now."""
+        return self._inner.trajectory()
+
+    def log(self) -> FrontEndLog:
+        """What it said, without itself."""
+        return FrontEndLog(self.answers, self.durations_ms)
+
+
+@dataclass(frozen=True, eq=False)
+class Tracked:
+    """What a front end left of a recording.
+
+    Attributes:
+        robot: "mav" or "ground".
+        front_end: What it said, image by image.
+        final: The poses that it believed in at the end.
+        slam: Whether it was SLAM, whose times mean something.
+    """
+
+    robot: str
+    front_end: FrontEndLog
+    final: Trajectory | None
+    slam: bool
+
+    def final_poses(self) -> list[tuple[int, SE3]]:
+        if self.final is None:
+            return []
+        return [(int(stamp), self.final[i]) for i, stamp in enumerate(self.final.stamps_ns)]

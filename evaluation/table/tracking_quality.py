@@ -1,0 +1,91 @@
+"""How well one robot was tracked: errors of live and final poses, gaps, consistency."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.se3 import SE3
+from airground.slam.front_end import Tracking
+from evaluation.table.consistency import consistency
+from evaluation.table.row_writer import RowWriter
+from evaluation.table.tracking_log import FrontEndLog, Tracked
+from evaluation.table.trajectory_error import aligned_errors, trajectory_error
+
+STAGE = "trajectory"
+ERROR_STAGE = "trajectory_error"
+SLAM_STAGE = {"mav": "mono_slam", "ground": "rgbd_slam"}
+DRAWN_EVERY_NS = 100_000_000
+"""Errors over time are kept this far apart."""
+
+
+def add_tracking(out: RowWriter, tracked: Tracked, true_pose: Callable[[int], SE3]) -> None:
+    """Write all that is measured of a robot's poses (Fig. 9, 10).
+
+    A robot that was never tracked has errors without a number, which count as failures.
+    """
+    robot, front_end = tracked.robot, tracked.front_end
+    ways = (("", front_end.live_poses()), ("final_", tracked.final_poses()))
+    for prefix, poses in ways:
+        error = trajectory_error(poses, true_pose)
+        out.add(STAGE, f"{robot}_{prefix}ate_se3_rmse_m", error.se3_rmse_m, "m")
+        out.add(STAGE, f"{robot}_{prefix}ate_sim3_rmse_m", error.sim3_rmse_m, "m")
+        out.add(STAGE, f"{robot}_{prefix}scale_error", error.scale_error, "")
+        if not prefix:
+            out.add(STAGE, f"{robot}_path_m", error.path_m, "m")
+        for time_s, value in _over_time(front_end, poses, true_pose):
+            out.add(ERROR_STAGE, f"{robot}_{prefix}error_m", value, "m", time_s=time_s)
+    _add_gaps(out, robot, front_end)
+    _add_consistency(out, robot, front_end, true_pose)
+    if tracked.slam:
+        for duration in front_end.durations_ms:
+            out.add("timing", SLAM_STAGE[robot], duration, "ms")
+
+
+def _over_time(
+    front_end: FrontEndLog, poses: list[tuple[int, SE3]], true_pose: Callable[[int], SE3]
+) -> Iterator[tuple[float, float]]:
+    """Seconds since the first image and the error then, NaN where there was no pose."""
+    stamps = np.array([stamp for stamp, _ in poses], np.int64)
+    errors = aligned_errors(poses, true_pose)
+    error_at = dict(zip(stamps.tolist(), errors.tolist(), strict=True))
+    all_stamps = np.array([answer.stamp_ns for answer in front_end.answers], np.int64)
+    for stamp in _spaced(all_stamps):
+        yield (stamp - int(all_stamps[0])) * 1e-9, error_at.get(stamp, float("nan"))
+
+
+def _spaced(stamps_ns: NDArray[np.int64]) -> list[int]:
+    """The first stamp of each interval."""
+    if len(stamps_ns) == 0:
+        return []
+    _, first = np.unique((stamps_ns - stamps_ns[0]) // DRAWN_EVERY_NS, return_index=True)
+    return stamps_ns[first].tolist()
+
+
+def _add_gaps(out: RowWriter, robot: str, front_end: FrontEndLog) -> None:
+    """How long it took to begin, and how much was tracked from then on."""
+    since = front_end.since_tracking()
+    if not since:
+        out.add(STAGE, f"{robot}_tracked_fraction", 0.0, "")
+        out.add(STAGE, f"{robot}_initialized_s", float("nan"), "s", note="never tracked")
+        return
+    share = np.mean([answer.tracking is Tracking.TRACKED for answer in since])
+    out.add(STAGE, f"{robot}_tracked_fraction", float(share), "")
+    waited_ns = since[0].stamp_ns - front_end.answers[0].stamp_ns
+    out.add(STAGE, f"{robot}_initialized_s", waited_ns * 1e-9, "s")
+
+
+def _add_consistency(
+    out: RowWriter, robot: str, front_end: FrontEndLog, true_pose: Callable[[int], SE3]
+) -> None:
+    """Only what the front end reports; an oracle claims nothing."""
+    parts = zip(("position", "pose"), consistency(front_end.answers, true_pose), strict=True)
+    for name, found in parts:
+        if np.isfinite(found.nees):
+            out.add(STAGE, f"{robot}_nees_{name}", found.nees, "")
+            out.add(STAGE, f"{robot}_within_95_{name}", found.within_95, "")
+    scales = [answer.scale for answer in front_end.answers if answer.scale is not None]
+    if scales and scales[-1].observable:
+        out.add(STAGE, f"{robot}_scale_sigma", scales[-1].sigma, "")

@@ -1,1 +1,0 @@
-"""Who claims to know, who is wrong, and whether the spread says so."""

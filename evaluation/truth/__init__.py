@@ -1,1 +1,0 @@
-"""What is known to be true, and how far results lie from it."""

@@ -1,0 +1,1 @@
+"""Generated pictures of cardboard, floors and ground, and baked light."""

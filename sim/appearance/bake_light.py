@@ -1,0 +1,149 @@
+"""Light that is worked out once: soft shadows and bounced light on a world that stands still.
+
+A shadow map is sharp, jagged and drawn anew for every frame. Here rays to an extended lamp and
+to the whole hemisphere give the irradiance at surface points; pictures carry it from then on,
+so that a frame costs no lighting at all.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from sim.geometry.ray_caster import RayCaster
+from sim.geometry.surface import Mesh
+from sim.scene import Light
+
+MAIN_SAMPLES = 24
+FILL_SAMPLES = 10
+AMBIENT_SAMPLES = 32
+DISPLAY_GAMMA = 2.2
+_FILL_RADIUS_DEG = 25.0
+_LIFT_M = 0.002
+_CHUNK = 20_000
+_GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
+_MAIN_COLOUR = np.array([1.03, 1.0, 0.94])
+_AMBIENT_COLOUR = np.array([0.95, 1.0, 1.07])
+# Light that a surface seen by a hemisphere ray sends back, per unit of its albedo: about half
+# of what open ground receives, for among boxes most surfaces lie in shade.
+_BOUNCE = 0.55
+
+
+@dataclass(frozen=True)
+class LightBaker:
+    """Casts rays in a world whose every triangle has a mean colour.
+
+    Attributes:
+        light: Lamps and ambient light.
+        caster: Holds the triangles.
+        albedo: (T, 3) mean linear reflectance of the triangles.
+    """
+
+    light: Light
+    caster: RayCaster
+    albedo: NDArray[np.float32]
+
+    @classmethod
+    def of(cls, mesh: Mesh, albedo: NDArray, light: Light) -> LightBaker:
+        return cls(light, RayCaster(mesh), np.asarray(albedo, np.float32))
+
+    def shade(self, points: NDArray, normals: NDArray) -> NDArray[np.float32]:
+        """(N, 3) factors for display values (gamma 2.2) of a surface lit by this light.
+
+        Args:
+            points: (N, 3) on the surface [m].
+            normals: (N, 3) unit normals, outward.
+        """
+        pieces = [
+            self._irradiance(points[k : k + _CHUNK], normals[k : k + _CHUNK])
+            for k in range(0, len(points), _CHUNK)
+        ]
+        return np.concatenate(pieces) ** (1 / DISPLAY_GAMMA)
+
+    def _irradiance(self, points: NDArray, normals: NDArray) -> NDArray[np.float32]:
+        light = self.light
+        origins = (points + _LIFT_M * normals).astype(np.float32)
+        normals = normals.astype(np.float32)
+        main = _cone(light.azimuth_deg, light.elevation_deg, light.radius_deg, MAIN_SAMPLES)
+        total = light.main * self._lamp(origins, normals, main)[:, None] * _MAIN_COLOUR
+        if light.fill > 0:
+            fill = _cone(light.azimuth_deg + 150, 50.0, _FILL_RADIUS_DEG, FILL_SAMPLES)
+            total = total + light.fill * self._lamp(origins, normals, fill)[:, None]
+        return (total + self._ambient(origins, normals)).astype(np.float32)
+
+    def _lamp(self, origins: NDArray, normals: NDArray, directions: NDArray) -> NDArray:
+        """(N,) irradiance, 1 for open level ground."""
+        cosine = np.maximum(normals @ directions.T, 0)
+        lit = np.zeros_like(cosine)
+        facing = np.flatnonzero(cosine.max(1) > 0)
+        if len(facing):
+            rays = np.empty((len(facing), len(directions), 6), np.float32)
+            rays[..., :3] = origins[facing, None]
+            rays[..., 3:] = directions
+            lit[facing] = ~self.caster.blocked(rays)
+        return (cosine * lit).sum(1) / np.maximum(directions[:, 2], 0).sum()
+
+    def _ambient(self, origins: NDArray, normals: NDArray) -> NDArray:
+        """(N, 3): open hemisphere gives the ambient level, what it hits bounces some light."""
+        rays = _hemisphere_rays(origins, normals, AMBIENT_SAMPLES)
+        _, hit = self.caster.hits(rays)
+        bounce = _BOUNCE * (self.light.main + self.light.ambient)
+        return _gather(hit, self.albedo, bounce, self.light.ambient * _AMBIENT_COLOUR)
+
+
+def _cone(azimuth_deg: float, elevation_deg: float, radius_deg: float, count: int) -> NDArray:
+    """(count, 3) unit directions spread evenly over a disc of the sky."""
+    azimuth, elevation = np.radians(azimuth_deg), np.radians(elevation_deg)
+    centre = np.array(
+        [
+            np.cos(azimuth) * np.cos(elevation),
+            np.sin(azimuth) * np.cos(elevation),
+            np.sin(elevation),
+        ]
+    )
+    across = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    up = np.cross(centre, across)
+    index = np.arange(count)
+    radius = np.tan(np.radians(radius_deg)) * np.sqrt((index + 0.5) / count)
+    angle = index * _GOLDEN_ANGLE
+    spread = radius[:, None] * (np.cos(angle)[:, None] * across + np.sin(angle)[:, None] * up)
+    directions = centre + spread
+    return (directions / np.linalg.norm(directions, axis=1, keepdims=True)).astype(np.float32)
+
+
+@njit(cache=True, error_model="numpy")
+def _hemisphere_rays(origins: NDArray, normals: NDArray, count: int) -> NDArray:
+    """(N, count, 6) rays with cosine-weighted directions, the pattern turned at each point."""
+    rays = np.empty((len(normals), count, 6), np.float32)
+    for n in range(len(normals)):
+        x, y, z = normals[n]
+        # A frame around the normal without branches on its direction (Duff et al. 2017).
+        sign = 1.0 if z >= 0 else -1.0
+        a = -1.0 / (sign + z)
+        b = x * y * a
+        turn = (n * 0.7548776662466927) % 1.0 * 2 * np.pi
+        for k in range(count):
+            radius = np.sqrt((k + 0.5) / count)
+            angle = turn + k * _GOLDEN_ANGLE
+            u, v, w = radius * np.cos(angle), radius * np.sin(angle), np.sqrt(1 - radius * radius)
+            rays[n, k, 0], rays[n, k, 1], rays[n, k, 2] = origins[n]
+            rays[n, k, 3] = u * (1 + sign * x * x * a) + v * b + w * x
+            rays[n, k, 4] = u * sign * b + v * (sign + y * y * a) + w * y
+            rays[n, k, 5] = -u * sign * x - v * y + w * z
+    return rays
+
+
+@njit(cache=True, error_model="numpy")
+def _gather(hit: NDArray, albedo: NDArray, bounce: float, sky: NDArray) -> NDArray:
+    """(N, 3) mean over rays: the sky where nothing is hit, else what the triangle sends back."""
+    out = np.zeros((hit.shape[0], 3), np.float32)
+    for n in range(hit.shape[0]):
+        for k in range(hit.shape[1]):
+            for c in range(3):
+                missed = hit[n, k] >= len(albedo)
+                out[n, c] += sky[c] if missed else bounce * albedo[hit[n, k], c]
+        out[n] /= hit.shape[1]
+    return out

@@ -1,0 +1,127 @@
+"""Pictures on geometry: generated, lit, and handed to MuJoCo as textures."""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.se3 import SE3
+from sim.appearance.bake_light import LightBaker
+from sim.appearance.cardboard import FaceKind, Make, paint_face
+from sim.appearance.sheet import faded, light_up
+from sim.geometry.rubble import Box
+
+# What a cube texture shows on each face of a box, in MuJoCo's order: outward normal, and the
+# box axes along which columns and rows grow (OpenGL's convention; a rendered test pins it).
+CUBE_FACES: tuple[tuple[tuple[int, int, int], ...], ...] = (
+    ((1, 0, 0), (0, 0, -1), (0, -1, 0)),
+    ((-1, 0, 0), (0, 0, 1), (0, -1, 0)),
+    ((0, 1, 0), (1, 0, 0), (0, 0, 1)),
+    ((0, -1, 0), (1, 0, 0), (0, 0, -1)),
+    ((0, 0, 1), (1, 0, 0), (0, -1, 0)),
+    ((0, 0, -1), (-1, 0, 0), (0, -1, 0)),
+)
+FACE_LIGHT_CELLS = 12
+
+
+def add_glowing_material(spec: mujoco.MjSpec, name: str, texture: str) -> None:
+    """A material that shows its texture as it is: the light is already in it."""
+    material = spec.add_material(
+        name=name, emission=1, specular=0, shininess=0, reflectance=0, rgba=[1, 1, 1, 1]
+    )
+    textures = list(material.textures)
+    textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = texture
+    material.textures = textures
+
+
+def add_picture(spec: mujoco.MjSpec, name: str, pixels: NDArray[np.uint8], cube: bool) -> None:
+    """Add a texture and a material of the same name.
+
+    Args:
+        pixels: (H, W, 3); for a cube, six squares stacked in the order of CUBE_FACES.
+    """
+    kind = mujoco.mjtTexture.mjTEXTURE_CUBE if cube else mujoco.mjtTexture.mjTEXTURE_2D
+    height, width = pixels.shape[:2]
+    texture = spec.add_texture(name=name, type=kind, width=width, height=height, nchannel=3)
+    texture.data = pixels.tobytes()
+    add_glowing_material(spec, name, name)
+
+
+def paint_boxes(
+    boxes: tuple[Box, ...],
+    makes: list[Make],
+    texture: float,
+    baker: LightBaker,
+    rng: np.random.Generator,
+) -> list[NDArray[np.uint8]]:
+    """The lit cube picture (6 side, side, 3) of every box; `texture` is its contrast."""
+    if not boxes:
+        return []
+    light = _face_light(boxes, baker)
+    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        jobs = [
+            pool.submit(_cube_picture, box, makes[box.make], texture, light[i], own)
+            for i, (box, own) in enumerate(zip(boxes, rng.spawn(len(boxes)), strict=True))
+        ]
+        return [job.result() for job in jobs]
+
+
+def _cube_picture(
+    box: Box, make: Make, texture: float, light: NDArray[np.float32], rng: np.random.Generator
+) -> NDArray[np.uint8]:
+    side = _resolution(box.size_m)
+    cube = np.empty((6 * side, side, 3), np.uint8)
+    for index, (normal, columns, rows) in enumerate(CUBE_FACES):
+        right, down = _upright(normal)
+        size = tuple(float(np.abs(axis) @ box.size_m) for axis in (right, down))
+        kind: FaceKind = "flaps" if normal[2] else "end" if normal[0] else "side"
+        pixels = faded(paint_face(make, (size[0], size[1]), kind, side, rng), texture)
+        turned = np.ascontiguousarray(np.rot90(pixels, _quarter_turns(right, down, columns, rows)))
+        light_up(turned, light[index], cube[index * side : (index + 1) * side])
+    return cube
+
+
+def _resolution(size_m: NDArray) -> int:
+    """Pixels along the longest edge, about one a millimetre."""
+    longest = float(size_m.max())
+    return 256 if longest < 0.2 else 384 if longest < 0.32 else 512
+
+
+def _upright(normal: tuple[int, ...]) -> tuple[NDArray, NDArray]:
+    """Right and down of a face's picture on a standing box, seen from outside."""
+    n = np.array(normal)
+    if normal[2]:
+        right = np.array([1, 0, 0])
+        return right, -np.cross(n, right)
+    return np.cross([0, 0, 1], n), np.array([0, 0, -1])
+
+
+def _quarter_turns(right: NDArray, down: NDArray, columns: tuple, rows: tuple) -> int:
+    """How often `np.rot90` must turn a picture until it grows along `columns` and `rows`."""
+    for turns in range(4):
+        if (right == columns).all() and (down == rows).all():
+            return turns
+        right, down = down, -right
+    raise AssertionError("a face's picture is never mirrored")
+
+
+def _face_light(boxes: tuple[Box, ...], baker: LightBaker) -> NDArray[np.float32]:
+    """(N, 6, n, n, 3) light factors on the faces of every box."""
+    n = FACE_LIGHT_CELLS
+    cells = (np.arange(n) + 0.5) / n * 2 - 1
+    v, u = np.meshgrid(cells, cells, indexing="ij")
+    frames = np.array(CUBE_FACES, float)
+    on_cube = (
+        frames[:, None, None, 0]
+        + u[None, ..., None] * frames[:, None, None, 1]
+        + v[None, ..., None] * frames[:, None, None, 2]
+    ).reshape(-1, 3)
+    normals = np.repeat(frames[:, 0], n * n, axis=0)
+    points = [box.T_world_box @ (on_cube * box.size_m / 2) for box in boxes]
+    turned = [SE3(box.T_world_box.rotation, np.zeros(3)) @ normals for box in boxes]
+    light = baker.shade(np.concatenate(points), np.concatenate(turned))
+    return light.reshape(len(boxes), 6, n, n, 3)

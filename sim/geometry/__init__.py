@@ -1,0 +1,1 @@
+"""Shapes of a world: boxes, terrain, rocks, surfaces, rays."""

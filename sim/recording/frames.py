@@ -1,0 +1,171 @@
+"""Images of a flight: any frame of either robot, the same whoever makes it and when."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.se3 import SE3
+from airground.io import layout
+from airground.io.calibration import CalibrationTable, RobotTable
+from airground.io.digests import bytes_digest
+from airground.io.recording_writer import ground_image_name, mav_image_name
+from sim.geometry.edges import Edges
+from sim.recording.render import Renderer
+from sim.recording.smooth_edges import smooth_edges
+from sim.robots.motion import ROBOTS, Motion, Robot
+from sim.sensors.camera import ImageSensor
+from sim.sensors.depth import kinect_depth
+from sim.sensors.presets import SensorPreset
+
+# Noise does not compress: the fastest settings, half the time of the default ones.
+PNG_SETTINGS = [
+    cv2.IMWRITE_PNG_COMPRESSION,
+    1,
+    cv2.IMWRITE_PNG_STRATEGY,
+    cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY,
+    cv2.IMWRITE_PNG_FILTER,
+    cv2.IMWRITE_PNG_FILTER_SUB,
+]
+_PNG_MAX = 65535
+
+
+@dataclass(frozen=True, eq=False)
+class FramePlan:
+    """All that a process needs to make frames.
+
+    Attributes:
+        recording: The folder that images are written into.
+        model: File of the compiled world with both cameras.
+        edges: File of its edges.
+        motion: File of both robots' motion.
+        true: How the sensors are.
+        preset: The faults of images and depth.
+        seeds: What the noise derives from.
+        stamps_ns: Stamps of each robot's images, as told.
+    """
+
+    recording: Path
+    model: Path
+    edges: Path
+    motion: Path
+    true: CalibrationTable
+    preset: SensorPreset
+    seeds: tuple[int, int]
+    stamps_ns: dict[Robot, NDArray[np.int64]]
+
+
+@dataclass(frozen=True)
+class Written:
+    """An image file: its folder in the recording, its name and its SHA-256."""
+
+    folder: str
+    name: str
+    digest: str
+
+
+class FrameMaker:
+    """Draws frames and puts their sensors' faults on them; writes them where asked.
+
+    A context manager, for the graphics context.
+    """
+
+    def __init__(self, plan: FramePlan) -> None:
+        self._plan = plan
+        self._motion = Motion.load(plan.motion)
+        self._edges = Edges.load(plan.edges)
+        self._renderer = Renderer(mujoco.MjModel.from_binary_path(str(plan.model)))
+        self._sensors: dict[Robot, ImageSensor] = {}
+        if plan.preset.image is not None:
+            for number, robot in enumerate(ROBOTS, start=1):
+                camera = self._table(robot).camera.pinhole()
+                rng = np.random.default_rng([*plan.seeds, number])
+                self._sensors[robot] = ImageSensor.of(camera, plan.preset.image, rng)
+
+    def __enter__(self) -> FrameMaker:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._renderer.close()
+
+    def make(self, robot: Robot, index: int) -> list[Written]:
+        """Write the files of one frame."""
+        stamp = int(self._plan.stamps_ns[robot][index])
+        if robot == "mav":
+            return [self._write(layout.MAV_IMAGES, mav_image_name(stamp), self.mav(index))]
+        colour, depth_units = self.ground(index)
+        name = ground_image_name(stamp)
+        return [
+            self._write(layout.GROUND_COLOUR, name, cv2.cvtColor(colour, cv2.COLOR_RGB2BGR)),
+            self._write(layout.GROUND_DEPTH, name, depth_units),
+        ]
+
+    def mav(self, index: int) -> NDArray[np.uint8]:
+        """(height, width) grey image of the MAV."""
+        time_ns, rng = self._start("mav", index)
+        T_world_camera = self._motion.camera_pose("mav", time_ns)
+        colour, depth = self._renderer.draw("mav", T_world_camera)
+        grey = cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY)[..., None]
+        grey = self._smooth("mav", grey, depth, T_world_camera)
+        if "mav" in self._sensors:
+            grey = self._expose("mav", grey, depth, time_ns, rng)
+        return np.asarray(grey[..., 0], np.uint8)
+
+    def ground(self, index: int) -> tuple[NDArray[np.uint8], NDArray[np.uint16]]:
+        """(height, width, 3) RGB and (height, width) depth as PNG values, of the ground robot."""
+        time_ns, rng = self._start("ground", index)
+        T_world_camera = self._motion.camera_pose("ground", time_ns)
+        colour, depth = self._renderer.draw("ground", T_world_camera)
+        colour = self._smooth("ground", colour, depth, T_world_camera)
+        if "ground" in self._sensors:
+            colour = self._expose("ground", colour, depth, time_ns, rng)
+        if self._plan.preset.depth is not None:
+            camera = self._table("ground").camera.pinhole()
+            depth = kinect_depth(depth, camera, self._plan.preset.depth, rng)
+        return colour, self._depth_units(depth)
+
+    def _start(self, robot: Robot, index: int) -> tuple[int, np.random.Generator]:
+        """When a frame is really taken [ns], and what its noise is drawn from."""
+        stamp = int(self._plan.stamps_ns[robot][index])
+        # Noise depends on the frame alone, not on who makes it. Counted from 1, for numpy
+        # takes [a] and [a, 0] as the same seed.
+        rng = np.random.default_rng([*self._plan.seeds, ROBOTS.index(robot) + 1, index + 1])
+        return stamp + self._table(robot).camera.time_offset_ns, rng
+
+    def _smooth(
+        self, robot: Robot, picture: NDArray, depth: NDArray, T_world_camera: SE3
+    ) -> NDArray[np.uint8]:
+        camera = self._table(robot).camera.pinhole()
+        return smooth_edges(picture, depth, camera, T_world_camera, self._edges)
+
+    def _expose(
+        self, robot: Robot, sharp: NDArray, depth: NDArray, time_ns: int, rng: np.random.Generator
+    ) -> NDArray[np.uint8]:
+        sensor = self._sensors[robot]
+        half_ns = round(sensor.noise.exposure_s * 0.5e9)
+        T_start_end = self._moved(robot, time_ns - half_ns, time_ns + half_ns)
+        return sensor.expose(sharp, depth, T_start_end, time_ns * 1e-9, rng)
+
+    def _moved(self, robot: Robot, start_ns: int, end_ns: int) -> SE3:
+        start = self._motion.camera_pose(robot, start_ns)
+        return start.inverse() @ self._motion.camera_pose(robot, end_ns)
+
+    def _depth_units(self, depth: NDArray[np.float32]) -> NDArray[np.uint16]:
+        """PNG values by the true scale; what is missing or too far for 16 bits is 0."""
+        units = depth * np.float32(self._plan.true.ground.depth.units_per_m)
+        fits = units <= _PNG_MAX  # false where NaN
+        return np.where(fits, np.rint(units), 0).astype(np.uint16)
+
+    def _write(self, folder: str, name: str, image: NDArray) -> Written:
+        _, encoded = cv2.imencode(".png", image, PNG_SETTINGS)
+        data = encoded.tobytes()
+        (self._plan.recording / folder / name).write_bytes(data)
+        return Written(folder, name, bytes_digest(data))
+
+    def _table(self, robot: Robot) -> RobotTable:
+        return self._plan.true.mav if robot == "mav" else self._plan.true.ground

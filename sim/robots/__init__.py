@@ -1,0 +1,1 @@
+"""How both robots move: paths, dynamics, motion."""

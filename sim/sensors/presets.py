@@ -1,0 +1,202 @@
+"""How good the robots' sensors are: perfect, as in life, or three times worse."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from airground.errors import InputError
+from sim.world.world.magnetic_field import EARTH_FIELD_WORLD
+
+
+@dataclass(frozen=True)
+class ImageNoise:
+    """What a camera does to a picture.
+
+    Attributes:
+        read_noise: Deviation of a black pixel [grey levels].
+        shot_noise: Variance added per grey level of light [grey levels].
+        vignetting: Share of the light that is lost in the corners.
+        exposure_drift: Deviation of the logarithm of the gain, over seconds.
+        exposure_s: How long the shutter is open [s].
+    """
+
+    read_noise: float
+    shot_noise: float
+    vignetting: float
+    exposure_drift: float
+    exposure_s: float
+
+
+@dataclass(frozen=True)
+class DepthNoise:
+    """What a Kinect does to depth (Nguyen, Izadi and Lovell, 3DIMPVT 2012).
+
+    Attributes:
+        axial_scale: Times the published axial deviation.
+        lateral_px: Deviation of a silhouette's place, on a surface seen head-on [px].
+        disparity_step_px: Disparity is rounded to this [px].
+        grazing_limit_deg: Angle of incidence at which half of a surface is missing [deg].
+        grazing_spread_deg: How soft that limit is [deg].
+        range_m: Nearest and farthest depth [m].
+    """
+
+    axial_scale: float
+    lateral_px: float
+    disparity_step_px: float
+    grazing_limit_deg: float
+    grazing_spread_deg: float
+    range_m: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class ImuNoise:
+    """White noise, bias and its random walk.
+
+    Attributes:
+        gyro_density: [rad/s/sqrt(Hz)]
+        gyro_walk: [rad/s^2/sqrt(Hz)]
+        gyro_bias: Deviation of the bias at the start [rad/s].
+        accelerometer_density: [m/s^2/sqrt(Hz)]
+        accelerometer_walk: [m/s^3/sqrt(Hz)]
+        accelerometer_bias: Deviation of the bias at the start [m/s^2].
+    """
+
+    gyro_density: float
+    gyro_walk: float
+    gyro_bias: float
+    accelerometer_density: float
+    accelerometer_walk: float
+    accelerometer_bias: float
+
+
+@dataclass(frozen=True)
+class MagneticNoise:
+    """What disturbs a magnetometer.
+
+    Attributes:
+        noise_t: White noise of one sample per axis [T].
+        hard_iron_t: Deviation of what the robot's own calibration leaves, per axis [T].
+        anomaly_scale: Times the anomaly that iron in the building makes.
+    """
+
+    noise_t: float
+    hard_iron_t: float
+    anomaly_scale: float
+
+
+@dataclass(frozen=True)
+class CalibrationErrors:
+    """Size of the difference between what the pipeline is told and what is true.
+
+    Signs and directions are drawn by the seed.
+
+    Attributes:
+        focal: Relative error of the focal lengths.
+        camera_to_imu: Angle by which the mounting is off [rad].
+        time_offset_ns: Camera's clock against the IMU's [ns].
+        depth_scale: Relative error of the depth camera's scale.
+    """
+
+    focal: float
+    camera_to_imu: float
+    time_offset_ns: int
+    depth_scale: float
+
+
+@dataclass(frozen=True)
+class SensorPreset:
+    """All sensors of both robots; None is a perfect one."""
+
+    name: str
+    image: ImageNoise | None
+    depth: DepthNoise | None
+    imu: ImuNoise | None
+    magnetic: MagneticNoise | None
+    calibration: CalibrationErrors | None
+
+
+# ADIS16448 as in EuRoC's sensor.yaml; the biases are those of a few minutes after turn-on.
+ADIS16448 = ImuNoise(
+    gyro_density=1.6968e-4,
+    gyro_walk=1.9393e-5,
+    gyro_bias=5e-3,
+    accelerometer_density=2.0e-3,
+    accelerometer_walk=3.0e-3,
+    accelerometer_bias=5e-2,
+)
+
+NONE = SensorPreset("none", None, None, None, None, None)
+
+NOMINAL = SensorPreset(
+    "nominal",
+    # 2 grey levels of noise at mid grey.
+    image=ImageNoise(1.0, 0.0235, 0.20, 0.03, 0.005),
+    depth=DepthNoise(1.0, 0.8, 1 / 8, 82.0, 2.0, (0.5, 5.0)),
+    imu=ADIS16448,
+    magnetic=MagneticNoise(0.2e-6, 0.3e-6, 0.6),
+    calibration=CalibrationErrors(1e-3, np.deg2rad(0.1), 1_000_000, 3e-3),
+)
+
+HARSH = SensorPreset(
+    "harsh",
+    image=ImageNoise(2.0, 0.094, 0.35, 0.10, 0.015),
+    depth=DepthNoise(1.5, 1.2, 1 / 8, 77.0, 4.0, (0.5, 4.5)),
+    imu=ImuNoise(
+        gyro_density=3 * ADIS16448.gyro_density,
+        gyro_walk=3 * ADIS16448.gyro_walk,
+        gyro_bias=3 * ADIS16448.gyro_bias,
+        accelerometer_density=3 * ADIS16448.accelerometer_density,
+        accelerometer_walk=3 * ADIS16448.accelerometer_walk,
+        accelerometer_bias=3 * ADIS16448.accelerometer_bias,
+    ),
+    magnetic=MagneticNoise(0.6e-6, 1.1e-6, 1.8),
+    calibration=CalibrationErrors(3e-3, np.deg2rad(0.3), 3_000_000, 9e-3),
+)
+
+PRESETS = {preset.name: preset for preset in (NONE, NOMINAL, HARSH)}
+
+
+def sensor_preset(name: str) -> SensorPreset:
+    """The preset of this name; InputError lists the known ones."""
+    if name not in PRESETS:
+        raise InputError(f"unknown sensor preset '{name}': known are {', '.join(PRESETS)}")
+    return PRESETS[name]
+
+
+def with_noise(preset: SensorPreset, factor: float) -> SensorPreset:
+    """The preset with `factor` times the noise of images, depth and inertial sensors.
+
+    What is no noise stays: the optics, steps of disparity, limits of depth, the magnetometers
+    and the errors of the calibration.
+    """
+    image, depth, imu = preset.image, preset.depth, preset.imu
+    return replace(
+        preset,
+        image=image
+        and replace(
+            image,
+            read_noise=factor * image.read_noise,
+            shot_noise=factor**2 * image.shot_noise,  # a variance
+        ),
+        depth=depth
+        and replace(
+            depth,
+            axial_scale=factor * depth.axial_scale,
+            lateral_px=factor * depth.lateral_px,
+        ),
+        imu=imu and ImuNoise(**{name: factor * value for name, value in vars(imu).items()}),
+    )
+
+
+def with_heading_error(preset: SensorPreset, deviation_deg: float) -> SensorPreset:
+    """The preset with headings of each robot's magnetometer that are off by this deviation.
+
+    All of it is hard iron, which turns with the robot; the room's own anomaly is left out, so
+    that the error is what is asked for.
+    """
+    horizontal_t = float(np.hypot(*EARTH_FIELD_WORLD[:2]))
+    noise_t = preset.magnetic.noise_t if preset.magnetic else 0.0
+    iron_t = horizontal_t * float(np.tan(np.deg2rad(deviation_deg)))
+    return replace(preset, magnetic=MagneticNoise(noise_t, iron_t, 0.0))

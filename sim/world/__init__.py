@@ -1,0 +1,1 @@
+"""A scene file and a seed become a MuJoCo world."""

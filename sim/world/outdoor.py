@@ -1,0 +1,127 @@
+"""Natural ground and rocks put into MuJoCo as meshes with lit pictures."""
+
+from __future__ import annotations
+
+import cv2
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.appearance.bake_light import LightBaker
+from sim.appearance.ground_picture import paint_ground, paint_rock
+from sim.appearance.pictures import add_picture
+from sim.appearance.sheet import faded, light_up
+from sim.geometry.noise import Image
+from sim.geometry.rocks import Rock
+from sim.geometry.surface import Mesh
+from sim.geometry.terrain import HeightField
+from sim.scene import Scene
+
+GROUND_PX_PER_M = 420.0
+ROCK_PX_PER_M = 450.0
+LIGHT_CELL_M = 0.025
+_PLAIN_GROUND = (0.55, 0.48, 0.38, 1)
+_PLAIN_ROCK = (0.55, 0.54, 0.52, 1)
+
+
+def add_ground(
+    spec: mujoco.MjSpec,
+    ground: HeightField,
+    scene: Scene,
+    baker: LightBaker | None,
+    rng: np.random.Generator,
+) -> None:
+    """Add the terrain with one picture over all of it, so that no seam shows."""
+    if baker:
+        size = (float(ground.size_m[0]), float(ground.size_m[1]))
+        painted = paint_ground(size, GROUND_PX_PER_M, scene.light.azimuth_deg, rng)
+        unlit = faded(painted, scene.texture)
+        picture = np.empty(unlit.shape, np.uint8)
+        light_up(unlit, _ground_light(ground, baker), picture)
+        add_picture(spec, "ground", picture, cube=False)
+    coordinates = ground.picture_coordinates()
+    _add_mesh(spec, "ground", ground.mesh(), coordinates, _PLAIN_GROUND, baker is not None)
+
+
+def add_rocks(
+    spec: mujoco.MjSpec,
+    rocks: tuple[Rock, ...],
+    texture: float,
+    baker: LightBaker | None,
+    rng: np.random.Generator,
+) -> None:
+    """Add every rock with a picture of its own."""
+    for rock, own in zip(rocks, rng.spawn(len(rocks)), strict=True):
+        side = int(np.clip(rock.diameter_m * ROCK_PX_PER_M * 0.8, 48, 320))
+        if baker:
+            picture = _rock_picture(rock, side, texture, baker, own)
+            add_picture(spec, rock.name, picture, cube=False)
+        coordinates = _rock_coordinates(rock.vertices.shape[1], side)
+        _add_mesh(spec, rock.name, rock.mesh(), coordinates, _PLAIN_ROCK, baker is not None)
+
+
+def _add_mesh(
+    spec: mujoco.MjSpec,
+    name: str,
+    mesh: Mesh,
+    coordinates: NDArray,
+    plain: tuple[float, ...],
+    picture: bool,
+) -> None:
+    """A mesh that is seen but not touched."""
+    vertices, triangles = mesh
+    spec.add_mesh(
+        name=name,
+        uservert=vertices.ravel(),
+        userface=triangles.ravel().astype(np.int32),
+        usertexcoord=coordinates.ravel(),
+        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,
+    )
+    spec.worldbody.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_MESH,
+        meshname=name,
+        contype=0,
+        conaffinity=0,
+        **({"material": name} if picture else {"rgba": plain}),
+    )
+
+
+def _ground_light(ground: HeightField, baker: LightBaker) -> Image:
+    """(rows, columns, 3) light factors over the whole field, the first row at the largest y."""
+    columns, rows = (int(np.ceil(side / LIGHT_CELL_M)) for side in ground.size_m)
+    x = ((np.arange(columns) + 0.5) / columns - 0.5) * ground.size_m[0]
+    y = (0.5 - (np.arange(rows) + 0.5) / rows) * ground.size_m[1]
+    x, y = (grid.ravel() for grid in np.meshgrid(x, y))
+    points = np.stack([x, y, ground.at(x, y)], axis=1)
+    light = baker.shade(points, ground.normals(x, y)).reshape(rows, columns, 3)
+    return np.asarray(cv2.GaussianBlur(light, (3, 3), 0), np.float32)
+
+
+def _rock_picture(
+    rock: Rock, side: int, texture: float, baker: LightBaker, rng: np.random.Generator
+) -> NDArray[np.uint8]:
+    """(2 side, 3 side, 3): six lit patches."""
+    light = baker.shade(rock.vertices.reshape(-1, 3), rock.normals().reshape(-1, 3))
+    patches = np.concatenate([rock.vertices, light.reshape(rock.vertices.shape)], axis=-1)
+    steps = np.linspace(0, rock.vertices.shape[1] - 1, side, dtype=np.float32)
+    map_x, map_y = np.meshgrid(steps, steps)
+    fine = np.empty((6, side, side, 6), np.float32)
+    for k, patch in enumerate(patches.astype(np.float32)):
+        for part in (slice(0, 3), slice(3, 6)):
+            source = np.ascontiguousarray(patch[..., part])
+            fine[k, ..., part] = cv2.remap(source, map_x, map_y, cv2.INTER_LINEAR)
+    centre = rock.vertices.reshape(-1, 3).mean(0)
+    pixels = faded(paint_rock(fine[..., :3] - centre, rock.diameter_m, rng), texture)
+    lit = np.clip(pixels * fine[..., 3:] + 0.5, 0, 255).astype(np.uint8)
+    return lit.reshape(2, 3, side, side, 3).swapaxes(1, 2).reshape(2 * side, 3 * side, 3)
+
+
+def _rock_coordinates(n: int, side: int) -> NDArray[np.float64]:
+    """(6 n n, 2) texture coordinates; nodes on a rim lie half a pixel inside their patch."""
+    inside = (0.5 + np.arange(n) / (n - 1) * (side - 1)) / side
+    v, u = np.meshgrid(inside, inside, indexing="ij")
+    patches = [
+        np.stack([(k % 3 + u) / 3, (k // 3 + v) / 2], axis=-1).reshape(-1, 2) for k in range(6)
+    ]
+    return np.concatenate(patches)

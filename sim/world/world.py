@@ -1,0 +1,161 @@
+"""A scene file and a seed become a world: geometry for physics, pictures and truth."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from airground.core.arrays import read_only
+from sim.appearance.bake_light import LightBaker
+from sim.appearance.cardboard import Make
+from sim.appearance.pictures import add_picture, paint_boxes
+from sim.appearance.print_marks import BRANDS
+from sim.geometry.rocks import scatter_rocks
+from sim.geometry.rubble import Box, make_heap
+from sim.geometry.surface import Mesh, box_mesh, join
+from sim.geometry.terrain import HeightField, make_terrain
+from sim.scene import Scene, Terrain
+from sim.world.world.outdoor import add_ground, add_rocks
+from sim.world.world.room import add_room, room_mesh
+
+# Mean linear reflectance of what bounces light.
+_CONCRETE = (0.32, 0.31, 0.29)
+_CARDBOARD = (0.42, 0.28, 0.15)
+_SOIL = (0.26, 0.19, 0.12)
+_STONE = (0.28, 0.26, 0.24)
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """Everything that stands still, with no joints.
+
+    Attributes:
+        scene, seed: What it was built from.
+        spec: MuJoCo specification to add robots and cameras to, then compile. Frame `world`.
+        vertices: (V, 3) float64, the true surface in `world` [m].
+        triangles: (T, 3) int64 vertex indices, counter-clockwise seen from outside.
+        boxes: The settled boxes, if any.
+        terrain: The height field of natural ground; None is a floor at z = 0.
+    """
+
+    scene: Scene
+    seed: int
+    spec: mujoco.MjSpec
+    vertices: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+    boxes: tuple[Box, ...]
+    terrain: HeightField | None = None
+
+    def __post_init__(self) -> None:
+        vertices = read_only(self.vertices, "vertices", (None, 3), np.float64)
+        triangles = read_only(self.triangles, "triangles", (None, 3), np.int64)
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "triangles", triangles)
+
+    def floor_height(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
+        """Height of the bare ground below boxes and rocks [m]; NaN outside it."""
+        if self.terrain is not None:
+            return self.terrain.at(x, y)
+        x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+        half = np.array(self.scene.room.size_m) / 2
+        return np.where((np.abs(x) <= half[0]) & (np.abs(y) <= half[1]), 0.0, np.nan)
+
+
+def build_world(scene: Scene, seed: int, pictures: bool = True) -> World:
+    """Build the world of `scene`; the same seed gives the same bytes.
+
+    Args:
+        scene: What to build.
+        seed: Decides shapes, poses and pictures; paths do not depend on it.
+        pictures: Without them surfaces have plain colours: the same geometry much sooner,
+            for physics and truth.
+    """
+    seeds = np.random.default_rng([seed, zlib.crc32(scene.name.encode())])
+    geometry_rng, picture_rng = seeds.spawn(2)
+    if scene.terrain:
+        return _build_outdoor(scene, seed, scene.terrain, geometry_rng, picture_rng, pictures)
+    boxes = make_heap(scene, geometry_rng)
+    box_meshes = [box_mesh(box.size_m, box.T_world_box) for box in boxes]
+    surface = join([room_mesh(scene.room), *box_meshes])
+    spec = _empty_spec(pictures)
+    # Walls throw no shadows, for the lamps hang inside the room.
+    floor = room_mesh(scene.room.model_copy(update={"wall_height_m": 0.0}))
+    baker = _baker(scene, floor, box_meshes, _CONCRETE, _CARDBOARD) if pictures else None
+    add_room(spec, scene.room, scene.texture, baker, picture_rng)
+    _add_boxes(spec, scene, boxes, baker, picture_rng)
+    return World(scene, seed, spec, *surface, boxes)
+
+
+def _build_outdoor(
+    scene: Scene,
+    seed: int,
+    terrain: Terrain,
+    geometry_rng: np.random.Generator,
+    picture_rng: np.random.Generator,
+    pictures: bool,
+) -> World:
+    ground = make_terrain(scene.room.size_m, terrain.relief_m, geometry_rng)
+    rocks = scatter_rocks(scene, ground, geometry_rng)
+    rock_meshes = [rock.mesh() for rock in rocks]
+    spec = _empty_spec(pictures)
+    baker = _baker(scene, ground.mesh(), rock_meshes, _SOIL, _STONE) if pictures else None
+    add_ground(spec, ground, scene, baker, picture_rng)
+    add_rocks(spec, rocks, scene.texture, baker, picture_rng)
+    return World(scene, seed, spec, *join([ground.mesh(), *rock_meshes]), (), ground)
+
+
+def _baker(
+    scene: Scene, floor: Mesh, things: list[Mesh], floor_albedo: tuple, thing_albedo: tuple
+) -> LightBaker:
+    mesh = join([floor, *things])
+    albedo = np.tile(thing_albedo, (len(mesh[1]), 1))
+    albedo[: len(floor[1])] = floor_albedo
+    return LightBaker.of(mesh, albedo, scene.light)
+
+
+def _empty_spec(lit: bool) -> mujoco.MjSpec:
+    spec = mujoco.MjSpec()
+    spec.visual.headlight.active = int(not lit)
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        rgb1=[0.62, 0.72, 0.84],
+        rgb2=[0.80, 0.82, 0.82],
+        width=64,
+        height=384,
+    )
+    spec.visual.map.znear = 0.005
+    spec.visual.map.zfar = 20
+    spec.stat.extent = 5.0
+    spec.stat.center = [0, 0, 0.5]
+    return spec
+
+
+def _add_boxes(
+    spec: mujoco.MjSpec,
+    scene: Scene,
+    boxes: tuple[Box, ...],
+    baker: LightBaker | None,
+    rng: np.random.Generator,
+) -> None:
+    """Add every box as a geom of its name, with its own six pictures if they are lit."""
+    if baker and scene.rubble:
+        names = rng.permutation(BRANDS)
+        makes = [Make.draw(rng, str(names[k % len(names)])) for k in range(scene.rubble.makes)]
+        pictures = paint_boxes(boxes, makes, scene.texture, baker, rng)
+        for box, picture in zip(boxes, pictures, strict=True):
+            add_picture(spec, box.name, picture, cube=True)
+    for box in boxes:
+        spec.worldbody.add_geom(
+            name=box.name,
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            size=box.size_m / 2,
+            pos=box.T_world_box.translation,
+            quat=np.roll(box.T_world_box.quaternion_xyzw(), 1),
+            **({"material": box.name} if baker else {"rgba": [0.72, 0.55, 0.36, 1]}),
+        )

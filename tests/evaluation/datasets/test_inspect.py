@@ -1,0 +1,179 @@
+"""The inspection finds what was put wrong, and nothing where all is right."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from airground.core.se3 import SE3
+from airground.core.trajectory import Trajectory
+from airground.errors import InputError
+from airground.io.tum import read_tum, write_tum
+from evaluation import cli
+from evaluation.datasets.inspection.findings import Finding, Rhythm, Verdict, look_at_stamps
+from evaluation.datasets.inspection.inspect_dataset import inspect_dataset
+from evaluation.datasets.inspection.photometric import Posed, fit
+from evaluation.datasets.plan import Plan, World
+from evaluation.datasets.simulated import Simulated
+
+Exported = Callable[[str], Path]
+APART = 8
+
+
+def of(findings: list[Finding], part: str, subject: str) -> Finding:
+    (found,) = [one for one in findings if (one.part, one.subject) == (part, subject)]
+    return found
+
+
+def wrong(findings: list[Finding]) -> list[tuple[str, str]]:
+    return [(one.part, one.subject) for one in findings if one.verdict is Verdict.WRONG]
+
+
+def airground(*words: object) -> int:
+    with pytest.raises(SystemExit) as ended:
+        cli.main([str(word) for word in words])
+    assert isinstance(ended.value.code, int)
+    return ended.value.code
+
+
+@pytest.fixture
+def tum(exported: Exported, tmp_path: Path) -> Path:
+    """A copy to put wrong."""
+    return Path(shutil.copytree(exported("tum"), tmp_path / "tum"))
+
+
+def test_a_recording_is_as_it_should_be(small: Path) -> None:
+    layout, findings = inspect_dataset(small)
+    assert layout == "airground"
+    assert wrong(findings) == []
+    assert of(findings, "mav", "images").found.startswith("21 at 30.0 Hz")
+    assert of(findings, "ground", "IMU").found.startswith("1001 at 200.0 Hz")
+    for part in ("mav", "ground"):
+        assert "px off" in of(findings, part, "truth against images").found
+
+
+def test_the_exit_code_and_the_json_tell_what_is_wrong(
+    small: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert airground("inspect", small, "--json") == 0
+    assert json.loads(capsys.readouterr().out)["wrong"] == 0
+    changed = Path(shutil.copytree(small, tmp_path / "changed"))
+    first, second = sorted((changed / "ground" / "rgb").iterdir())[:2]
+    shutil.copyfile(first, second)
+    assert airground("inspect", changed, "--json") == 1
+    told = json.loads(capsys.readouterr().out)
+    assert told["layout"] == "airground"
+    (one,) = [finding for finding in told["findings"] if finding["verdict"] == "wrong"]
+    assert one["subject"] == "digests"
+    assert "ground/rgb: differs" in one["found"]
+
+
+def test_all_recordings_of_a_dataset_are_looked_at(small: Path, tmp_path: Path) -> None:
+    worlds = tuple(
+        World(scene="small", name="small", digest="", seed=seed, part=part)
+        for seed, part in ((0, "train"), (1, "train"), (2, "test"))
+    )
+    plan = Plan(sensors="nominal", duration_s=None, worlds=worlds)
+    (tmp_path / "dataset.json").write_text(plan.model_dump_json())
+    for folder in ("train/small_s0", "test/small_s2", "test/small_s7"):
+        shutil.copytree(small, tmp_path / folder)
+    (tmp_path / "test/small_s2/ground/rgb.txt").write_text("changed")
+    layout, findings = inspect_dataset(tmp_path)
+    assert layout == "dataset"
+    assert of(findings, "", "recordings").found == "2 of 3 planned"
+    told = wrong(findings)
+    assert told[:2] == [("train/small_s1", "recording"), ("test/small_s7", "recording")]
+    assert {part.split()[0] for part, _ in told[2:]} == {"test/small_s2"}
+    assert of(findings, "train/small_s0 mav", "images").found.startswith("21 at 30.0 Hz")
+
+
+def test_what_cannot_be_read_is_a_finding(small: Path, tmp_path: Path) -> None:
+    broken = Path(shutil.copytree(small, tmp_path / "broken"))
+    (broken / "mav0" / "cam0" / "data.csv").unlink()
+    _, findings = inspect_dataset(broken)
+    assert wrong(findings) == [("", "readable")]
+    with pytest.raises(InputError, match="holds neither"):
+        inspect_dataset(tmp_path)
+
+
+def turned(folder: Path, vector_deg: tuple[float, float, float]) -> None:
+    """Every other true pose is turned in the camera."""
+    path = folder / "groundtruth.txt"
+    poses = read_tum(path)
+    turn = SE3.from_rotation_vector(np.deg2rad(vector_deg))
+    changed = [poses[i] @ turn if i >= APART else poses[i] for i in range(len(poses))]
+    write_tum(path, Trajectory.from_poses(poses.stamps_ns.tolist(), changed))
+
+
+def test_a_truth_that_does_not_fit_the_images_is_found(tum: Path) -> None:
+    """Some of the pairs are on one side of the change: half of them are enough."""
+    assert wrong(inspect_dataset(tum)[1]) == []
+    turned(tum, (0.0, 2.0, 0.0))  # 18 px
+    assert wrong(inspect_dataset(tum)[1]) == [("ground", "truth against images")]
+
+
+def test_a_truth_that_carries_images_out_of_each_other_is_found(tum: Path) -> None:
+    turned(tum, (0.0, 70.0, 0.0))
+    found = of(inspect_dataset(tum)[1], "ground", "truth against images")
+    assert found.verdict is Verdict.WRONG
+    assert found.found.startswith("the truth carries most of each image out")
+
+
+def test_a_truth_in_other_axes_is_found(tum: Path) -> None:
+    """The pose of a body with x forward, in place of a camera's."""
+    path = tum / "groundtruth.txt"
+    poses = read_tum(path)
+    body = SE3(np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]), np.zeros(3))
+    changed = [poses[i] @ body for i in range(len(poses))]
+    write_tum(path, Trajectory.from_poses(poses.stamps_ns.tolist(), changed))
+    assert wrong(inspect_dataset(tum)[1]) == [("ground", "truth against images")]
+
+
+def test_missing_images_are_counted(tum: Path) -> None:
+    for name in ("rgb.txt", "depth.txt"):
+        lines = (tum / name).read_text().splitlines()
+        (tum / name).write_text("\n".join(lines[:5] + lines[8:]) + "\n")
+    found = of(inspect_dataset(tum)[1], "ground", "images")
+    assert found.verdict is Verdict.NOTED
+    assert "18 at 30.0 Hz" in found.found
+    assert "3 missing, longest gap 0.133 s" in found.found
+
+
+def test_a_long_gap_is_wrong() -> None:
+    stamps = np.arange(100, dtype=np.int64) * 5_000_000
+    stamps[50:] += 60_000_000
+    assert look_at_stamps("mav", "IMU", stamps).verdict is Verdict.WRONG
+    rhythm = Rhythm.of(stamps)
+    assert (rhythm.missing, rhythm.rate_hz) == (12, pytest.approx(200.0))
+    assert rhythm.longest_gap_s == pytest.approx(0.065)
+
+
+@pytest.mark.parametrize("offset", [(0.0, 0.0), (3.0, 0.0), (0.0, -5.0), (-14.0, 9.0)])
+@pytest.mark.parametrize("robot", ["mav", "ground"])
+def test_the_error_is_measured_in_pixels(
+    simulated: Simulated, robot: str, offset: tuple[float, float]
+) -> None:
+    """A second pose that is wrong by so many pixels is found to be off by as many."""
+    truth, recording = simulated.truth, simulated.recording
+    stamps = simulated.stamps_ns(robot)  # type: ignore[arg-type]
+    camera = truth.camera(robot)  # type: ignore[arg-type]
+    posed = []
+    for index in (2, 2 + APART):
+        if robot == "mav":
+            grey = recording.read_mav_image(index).image
+        else:
+            grey = recording.read_ground_image(index).colour.mean(axis=2).astype(np.uint8)
+        depth = truth.depth(robot, stamps[index])  # type: ignore[arg-type]
+        posed.append(Posed(grey, depth, truth.T_world_camera(robot, stamps[index])))  # type: ignore[arg-type]
+    x, y = offset
+    turn = SE3.from_rotation_vector((-y / camera.fy, x / camera.fx, 0.0))
+    moved = Posed(posed[1].grey, posed[1].depth, posed[1].T_world_camera @ turn)
+    found = fit(posed[0], moved, camera)
+    assert found is not None
+    assert found.rise > 1.1
+    np.testing.assert_allclose(found.offset_px, offset, atol=0.4)

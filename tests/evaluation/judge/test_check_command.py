@@ -1,0 +1,137 @@
+"""`airground check` and `airground accept` as a user and a CI meet them."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from rich.console import Console
+
+from evaluation import cli
+from evaluation.judge.metrics import WATCHED
+from evaluation.judge.summary import build_summary
+from evaluation.judge.verdict import compare
+from evaluation.setup import console
+from evaluation.setup.run_info import RunInfo
+from evaluation.show.comparison.verdict_table import HEADER, cells, markdown, print_comparison
+from evaluation.table.rows import ResultTable
+from tests.evaluation.judge.flights import make_results, measured
+
+SEEDS = range(10)
+
+
+def exit_code(*words: object) -> object:
+    with pytest.raises(SystemExit) as exit_:
+        cli.main([str(word) for word in words])
+    return exit_.value.code
+
+
+def one_error_line(capsys: pytest.CaptureFixture[str]) -> str:
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("airground: error: ")
+    return line
+
+
+def write(table: ResultTable, folder: Path) -> Path:
+    """What check and accept read of a run's folder."""
+    folder.mkdir()
+    table.write(folder / "results.parquet")
+    run = RunInfo("0.1.0", "abc123", 0, "some CPU", 2)
+    build_summary(table, table.conditions()[0], run).write(folder / "summary.json")
+    return folder
+
+
+@pytest.fixture
+def accepted(tmp_path: Path) -> Path:
+    path = tmp_path / "accepted.json"
+    results = write(make_results(SEEDS), tmp_path / "accepted")
+    assert exit_code("accept", results, "--reason", "first figures", "--to", path) == 0
+    return path
+
+
+def test_the_same_results_pass(accepted: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    results = accepted.with_name("accepted")
+    assert exit_code("check", results, "--against", accepted) == console.EXIT_OK
+    assert "No difference seen" in capsys.readouterr().out
+
+
+def test_worse_results_fail_and_are_told_in_three_forms(accepted: Path, tmp_path: Path) -> None:
+    results = write(make_results(SEEDS, {"error_median_m": 1.4}), tmp_path / "worse")
+    pull, xml = tmp_path / "check.md", tmp_path / "check.xml"
+    words = ("check", results, "--against", accepted, "--markdown", pull, "--junit", xml)
+    assert exit_code(*words) == 1
+    assert "1 worse: surface, median error" in pull.read_text()
+
+    suite = ElementTree.parse(xml).getroot().find("testsuite")
+    assert suite is not None
+    cases = suite.findall("testcase")
+    assert [case.get("name") for case in cases] == [metric.name for metric in WATCHED]
+    failed = [case.get("name") for case in cases if case.find("failure") is not None]
+    assert failed == ["surface_median"]
+    assert (suite.get("tests"), suite.get("failures")) == (str(len(WATCHED)), "1")
+
+
+def test_better_results_pass(accepted: Path, tmp_path: Path) -> None:
+    results = write(make_results(SEEDS, {"error_median_m": 0.7}), tmp_path / "better")
+    assert exit_code("check", results, "--against", accepted) == console.EXIT_OK
+
+
+def test_results_can_be_held_against_other_results(accepted: Path, tmp_path: Path) -> None:
+    results = write(make_results(SEEDS, {"error_median_m": 1.4}), tmp_path / "worse")
+    before = accepted.with_name("accepted")
+    assert exit_code("check", results, "--against", before) == 1
+    assert exit_code("check", before, "--against", results) == 0
+
+
+def test_what_cannot_be_compared_is_one_line(
+    accepted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    few = write(make_results(range(3)), tmp_path / "few")
+    frame = make_results(SEEDS).frame.assign(preset="paper")
+    paper = write(ResultTable(frame), tmp_path / "paper")
+    capsys.readouterr()
+    for results, complaint in (
+        (few, "expected flat x 1, tiny x 10"),
+        (paper, "nothing was measured with preset best"),
+        (tmp_path / "nowhere", "no such folder"),
+    ):
+        assert exit_code("check", results, "--against", accepted) == console.EXIT_ERROR
+        assert complaint in one_error_line(capsys)
+
+
+def test_accepting_without_a_reason_changes_nothing(
+    accepted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = accepted.read_bytes()
+    capsys.readouterr()
+    results = accepted.with_name("accepted")
+    assert exit_code("accept", results, "--reason", " ", "--to", accepted) == console.EXIT_ERROR
+    assert "--reason" in one_error_line(capsys)
+    assert accepted.read_bytes() == before
+
+
+@pytest.mark.parametrize("word", ["--quick", "--trials 3", "--scenes tiny"])
+def test_the_suite_is_fixed(word: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ("reproduce", "--suite", "fast", *word.split(), "--out", tmp_path / "out")
+    assert exit_code(*words) == console.EXIT_ERROR
+    assert "the suite fast is fixed" in one_error_line(capsys)
+
+
+def test_markdown_is_a_table_of_every_metric() -> None:
+    comparison = compare(measured(SEEDS), measured(SEEDS, {"error_median_m": 1.4}))
+    lines = [line for line in markdown(comparison).splitlines() if line.startswith("|")]
+    assert len(lines) == len(WATCHED) + 2 * 2
+    assert {line.count("|") for line in lines} == {len(HEADER) + 1}
+
+
+@pytest.mark.parametrize("width", [80, 140])
+def test_the_screens_table_fits(width: int) -> None:
+    comparison = compare(measured(SEEDS), measured(SEEDS, {"error_median_m": 1.4}))
+    screen = Console(width=width, record=True, file=io.StringIO())
+    print_comparison(comparison, screen)
+    rows = screen.export_text().splitlines()
+    for judged in comparison.judged:
+        row = cells(judged)
+        assert any(row[0] in line and row[-1] in line for line in rows), row

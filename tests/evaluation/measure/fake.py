@@ -1,0 +1,66 @@
+"""Units that cost nothing: what they give depends on their seed alone, and they leave a trace."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+from airground.config import Config
+from evaluation.measure.protocol.trials import Protocol
+from evaluation.measure.work.experiment import Outcome
+from evaluation.measure.work.measure import Refused, Sent
+from evaluation.measure.work.unit import Unit
+from evaluation.setup.setups import Setup, with_localization
+from evaluation.table.rows import Row
+
+DIE_ONCE, DIE, REFUSE, PAUSE_S = "die_once", "die", "refuse", "pause_s"
+"""Files in a unit's folder that say what is to happen in it."""
+RUNS = "runs"
+"""Has a byte for each time that a unit was run."""
+
+
+def fake_units(folder: Path, count: int, pause_s: float = 0.0) -> list[Unit]:
+    """Two variants of localization on each of `count` flights, whose folders are made here."""
+    units = []
+    for seed in range(count):
+        flight = folder / f"flight_{seed}"
+        flight.mkdir(parents=True, exist_ok=True)
+        (flight / "recording.toml").write_text(f"seed = {seed}\n")
+        (flight / PAUSE_S).write_text(str(pause_s))
+        for particles in (50, 200):
+            setup = Setup(with_localization(Config(), particles=particles))
+            units.append(Unit(flight, seed, 0, setup, Protocol()))
+    return units
+
+
+def runs(folder: Path) -> list[int]:
+    """How often each flight was run."""
+    files = sorted(folder.glob("flight_*"), key=lambda file: int(file.name.rpartition("_")[2]))
+    return [(file / RUNS).stat().st_size if (file / RUNS).exists() else 0 for file in files]
+
+
+def work(sent: Sent) -> Outcome | Refused:
+    """In place of `evaluation.measure.work.measure.work`."""
+    task = sent.task
+    assert isinstance(task.recording, Path)
+    with (task.recording / RUNS).open("ab") as file:
+        file.write(b"x")
+    time.sleep(float((task.recording / PAUSE_S).read_text()))
+    once = task.recording / DIE_ONCE
+    if once.exists():
+        once.unlink()
+        os.kill(os.getpid(), signal.SIGKILL)
+    if (task.recording / DIE).exists():
+        os.kill(os.getpid(), signal.SIGKILL)
+    if (task.recording / REFUSE).exists():
+        return Refused(f"flight {task.seed} is impossible")
+    parts = []
+    for setup in task.setups:
+        value = task.seed + setup.config.localization.particles / 1000
+        condition = setup.condition("none")
+        place = {"sequence": 0, "iteration": 1}
+        row = Row("tiny", task.seed, 0, condition, "localization", "error_m", value, "m", **place)
+        parts.append([row])
+    return Outcome(parts, None)

@@ -1,0 +1,137 @@
+"""Clusters elsewhere: a scheduler that is there, jobs of a batch system, and what is refused."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import dask
+import pytest
+from distributed import Client, LocalCluster
+
+from airground.errors import AirgroundError, InputError
+from evaluation.measure.work.batch_system import batch_cluster, read_jobs
+from evaluation.measure.work.crew import Crew
+
+SLURM = """
+jobs: 8
+jobqueue:
+  slurm: {cores: 4, processes: 4, memory: 16GB, walltime: "02:00:00"}
+"""
+
+
+def square(number: int) -> int:
+    return number * number
+
+
+def nap(seconds: float) -> float:
+    time.sleep(seconds)
+    return seconds
+
+
+def squares(cluster: str, scratch: Path) -> list[tuple[int, int]]:
+    with Crew(cluster, 1, 3, scratch) as crew:
+        return sorted(crew.outcomes(square, [1, 2, 3]))
+
+
+@contextmanager
+def scheduler(scratch: Path, threads: int = 1, daemon: bool = False) -> Iterator[str]:
+    """The address of a cluster of one worker."""
+    settings = {"distributed.worker.daemon": daemon, "temporary-directory": str(scratch)}
+    with (
+        dask.config.set(settings),
+        LocalCluster(
+            n_workers=1,
+            threads_per_worker=threads,
+            host="127.0.0.1",
+            scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+        ) as cluster,
+    ):
+        yield cluster.scheduler_address
+
+
+def test_a_scheduler_that_is_there_is_joined_and_left_alone(tmp_path: Path) -> None:
+    with scheduler(tmp_path) as address:
+        for _ in range(2):
+            assert squares(address, tmp_path) == [(0, 1), (1, 4), (2, 9)]
+
+
+@pytest.mark.slow
+def test_a_cluster_that_goes_away_is_told(tmp_path: Path) -> None:
+    with scheduler(tmp_path) as address, Crew(address, 1, 2, tmp_path) as crew:
+        outcomes = crew.outcomes(nap, [0.0, 600.0])
+        assert next(outcomes) == (0, 0.0)
+        with Client(address, set_as_default=False) as other:
+            other.shutdown()
+        with pytest.raises(AirgroundError, match="the cluster went away"):
+            next(outcomes)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("threads", "daemon", "message"),
+    [(2, False, "--nthreads 1"), (1, True, "DASK_DISTRIBUTED__WORKER__DAEMON=False")],
+)
+def test_workers_that_cannot_do_it_are_refused(
+    threads: int, daemon: bool, message: str, tmp_path: Path
+) -> None:
+    with scheduler(tmp_path, threads, daemon) as address, pytest.raises(InputError, match=message):
+        squares(address, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("cluster", "message"),
+    [("somewhere", "expected tcp://HOST:PORT"), ("tcp://127.0.0.1:1", "no Dask scheduler answers")],
+)
+def test_a_cluster_that_is_not_there_is_told(
+    cluster: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("evaluation.measure.work.crew.CONNECT_S", 1)
+    with pytest.raises(InputError, match=message):
+        squares(cluster, tmp_path)
+
+
+def test_a_batch_system_is_described_as_for_dask_jobqueue(tmp_path: Path) -> None:
+    file = tmp_path / "slurm.yaml"
+    file.write_text(SLURM)
+    jobs = read_jobs(file)
+    assert jobs.jobs == 8
+    assert jobs.jobqueue["slurm"]["walltime"] == "02:00:00"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("jobs: 8", "", "jobs: Field required"),
+        ("jobs: 8", "jobs: 0", "jobs: Input should be greater"),
+        ("jobs: 8", "jobs: 8\nworkers: 3", "workers: Extra inputs"),
+        ("slurm:", "slrm:", "unknown system 'slrm'; known: slurm"),
+        ("jobqueue:", "jobqueue: [", "no YAML"),
+        ("8", "!!python/object/apply:os.system ['true']", "no YAML"),
+        ("processes: 4", "processes: 2", "must be the same number"),
+    ],
+)
+def test_a_file_that_cannot_be_used_is_told(
+    old: str, new: str, message: str, tmp_path: Path
+) -> None:
+    pytest.importorskip("dask_jobqueue")
+    file = tmp_path / "slurm.yaml"
+    with pytest.raises(InputError, match=r"slurm\.yaml: No such file"):
+        read_jobs(file)
+    assert old in SLURM
+    file.write_text(SLURM.replace(old, new, 1))
+    with pytest.raises(InputError, match=message):
+        batch_cluster(file)
+
+
+@pytest.mark.slow
+def test_jobs_do_the_work(tmp_path: Path) -> None:
+    pytest.importorskip("dask_jobqueue")
+    file = tmp_path / "local.yaml"
+    file.write_text(
+        "jobs: 1\njobqueue:\n  local: {cores: 1, processes: 1, memory: 4GB, interface: lo,"
+        f" local_directory: {tmp_path}}}\n"
+    )
+    assert squares(str(file), tmp_path) == [(0, 1), (1, 4), (2, 9)]

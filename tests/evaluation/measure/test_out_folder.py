@@ -1,0 +1,90 @@
+"""Folders that runs go on with, and folders that they leave alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from airground.errors import InputError
+from evaluation.measure.work.experiment import Outcome
+from evaluation.measure.work.out_folder import LOCK, resumable_folder
+from evaluation.measure.work.unit import UnitStore
+from evaluation.setup.condition import Condition
+from evaluation.table.rows import Row
+
+ROW = Row("tiny", 0, 0, Condition("best", "slam", "none", "known"), "run", "recorded_s", 1.0, "s")
+FOUND = Outcome([[ROW]], None)
+
+
+def fail_after_a_unit(out: Path) -> None:
+    with resumable_folder(out) as folder:
+        folder.store.write("key", {}, FOUND.rows, None)
+        (folder.results / "summary.json").write_text("first")
+        (folder.scratch / "left").write_text("behind")
+        raise RuntimeError
+
+
+def test_results_appear_when_all_are_whole(tmp_path: Path) -> None:
+    out = tmp_path / "deep/out"
+    with pytest.raises(RuntimeError):
+        fail_after_a_unit(out)
+    assert {file.name for file in out.iterdir()} == {LOCK, "units"}
+    for text in ("second", "third"):
+        with resumable_folder(out) as folder:
+            assert "key" in folder.store
+            (folder.results / "summary.json").write_text(text)
+            (folder.results / "figures").mkdir()
+            (folder.results / "figures" / text).touch()
+        assert (out / "summary.json").read_text() == text
+        assert [file.name for file in (out / "figures").iterdir()] == [text]
+    assert {file.name for file in out.iterdir()} == {LOCK, "units", "summary.json", "figures"}
+
+
+def test_nothing_done_leaves_nothing(tmp_path: Path) -> None:
+    with pytest.raises(RuntimeError), resumable_folder(tmp_path / "out"):
+        raise RuntimeError
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_other_folders_are_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "mine").write_text("precious")
+    with pytest.raises(InputError, match="exists already"), resumable_folder(tmp_path):
+        pass
+    with (
+        pytest.raises(InputError, match="cannot create it"),
+        resumable_folder(tmp_path / "mine/out"),
+    ):
+        pass
+    assert [file.name for file in tmp_path.iterdir()] == ["mine"]
+
+
+def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with resumable_folder(out) as folder:
+        folder.store.write("key", {}, FOUND.rows, None)
+        with pytest.raises(InputError, match="another run"), resumable_folder(out):
+            pass
+        assert folder.scratch.is_dir()
+    with resumable_folder(out):
+        pass
+
+
+def test_what_a_killed_run_left_half_written_is_removed(tmp_path: Path) -> None:
+    store = UnitStore(tmp_path)
+    store.write("whole", {"a": 1}, FOUND.rows, None)
+    half = tmp_path / ".partial-x"
+    half.mkdir()
+    (half / "rows.parquet").write_bytes(b"PAR1")
+    again = UnitStore(tmp_path)
+    assert "whole" in again
+    assert again.read("whole").table.frame["value"].tolist() == [1.0]
+    assert [file.name for file in tmp_path.iterdir()] == ["whole"]
+
+
+def test_a_damaged_unit_is_named(tmp_path: Path) -> None:
+    store = UnitStore(tmp_path)
+    store.write("key", {}, FOUND.rows, None)
+    (tmp_path / "key/rows.parquet").write_bytes(b"PAR1")
+    with pytest.raises(InputError, match=r"key/rows\.parquet: no readable results table"):
+        store.read("key")

@@ -1,0 +1,59 @@
+"""Sequences that overlap run side by side as each would alone, and compute once what they share."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import numpy as np
+import pytest
+
+from airground.config import Config, paper
+from airground.core.belief import Belief
+from airground.core.events import BeliefUpdated, CostMapComputed, HeightMapsMade
+from evaluation.measure.protocol.trials import localize_sequence, localize_sequences
+from evaluation.setup.setups import with_localization
+from tests.evaluation.judge.test_sabotage import Flown, fly
+
+LENGTH, STARTS = 3, (0, 1, 3)
+CONFIGS = {
+    "best": Config(),
+    "paper": paper(),
+    "searched": with_localization(Config(), heading="search", headings=30),
+}
+
+
+@pytest.fixture(scope="module")
+def flown() -> Flown:
+    return fly(2)
+
+
+@pytest.mark.parametrize("name", CONFIGS)
+def test_side_by_side_is_as_one_by_one(flown: Flown, name: str) -> None:
+    config, sightings = CONFIGS[name], flown.sightings
+    filters = [(start, np.random.default_rng(start)) for start in STARTS]
+    together: dict[int, list[Belief]] = defaultdict(list)
+    shared: list[int] = []
+    steps = localize_sequences(sightings, LENGTH, flown.truth, config, filters)  # type: ignore[arg-type]
+    for sequence, event, duration_ms, iteration in steps:
+        if isinstance(event, BeliefUpdated):
+            assert iteration is not None
+            assert duration_ms is not None
+            together[sequence].append(iteration.belief)
+        if isinstance(event, (HeightMapsMade, CostMapComputed)) and duration_ms is None:
+            shared.append(sequence)
+
+    for sequence, start in enumerate(STARTS):
+        part, rng = sightings[start : start + LENGTH], np.random.default_rng(start)
+        alone = localize_sequence(part, flown.truth, config, rng)  # type: ignore[arg-type]
+        beliefs = [iteration.belief for *_, iteration in alone if iteration is not None]
+        assert len(beliefs) == len(together[sequence]) == min(LENGTH, len(sightings) - start)
+        for belief, other in zip(beliefs, together[sequence], strict=True):
+            np.testing.assert_array_equal(belief.particles, other.particles)
+            assert belief.cost == other.cost
+            assert belief.refusal == other.refusal
+
+    # What an earlier sequence has met already is not computed, nor timed, again.
+    seen = [range(start, min(start + LENGTH, len(sightings))) for start in STARTS]
+    again = [len(set(seen[i]) & {m for other in seen[:i] for m in other}) for i in range(3)]
+    heights_and_costs = 1 if name == "paper" else 2
+    assert [shared.count(i) for i in range(3)] == [heights_and_costs * count for count in again]

@@ -1,0 +1,185 @@
+"""Live runs as a whole: processes, sockets, their results and their ends."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from airground.config import Config, GroundMapping
+from airground.io.header import write_toml
+from airground.io.recording import Recording
+from evaluation.judge.live_summary import LiveSummary, live_summary
+from evaluation.run.drops import nothing_dropped
+from evaluation.run.live.live_run import run_live
+from evaluation.run.live.playback import Playback
+from evaluation.run.live.radio_link import RadioLimits
+from evaluation.run.recording import RunResult, run_recording
+from evaluation.setup import console
+from evaluation.setup.setups import Setup
+from sim.recording.truth import Truth
+from tests.io.recordings import HEIGHT, UNITS_PER_M, WIDTH, calibration, write_recording
+from tests.sim.flights import simulate, small_scene
+
+pytestmark = pytest.mark.slow
+
+SETUP = Setup(Config(ground_mapping=GroundMapping(min_keyframes=1)), "oracle")
+PATIENCE_S = 60.0
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    """Four images a robot, with somebody who knows where they were taken."""
+    path = write_recording(tmp_path_factory.mktemp("live") / "recording")
+    truth = path / "truth"
+    truth.mkdir()
+    write_toml(truth / "calibration.toml", calibration())
+    simulate(small_scene()).save(truth / "motion.npz")
+    for file in (path / "ground" / "depth").iterdir():
+        cv2.imwrite(str(file), np.full((HEIGHT, WIDTH), 2 * UNITS_PER_M, np.uint16))
+    return Recording.open(path)
+
+
+def told(result: RunResult) -> LiveSummary:
+    summary = live_summary(result.table)
+    assert summary is not None
+    return summary
+
+
+def test_a_live_run_that_drops_nothing_is_the_run_offline(recording: Recording) -> None:
+    truth = Truth.open(recording.path)
+    playback = Playback(rate=1000.0, waiting_frames=100, patience_s=PATIENCE_S)
+    live, drops = run_live(recording, truth, SETUP, 0, playback)
+    assert drops == nothing_dropped(recording)
+    offline = run_recording(recording, truth, SETUP, 0)
+    assert_same(live, offline)
+    summary = told(live)
+    for one in (summary.mav, summary.ground):
+        assert (one.survived, one.images, one.dropped, one.posed_ms.n) == (1, 4, 0, 4)
+        assert one.mapped_ms.n == 4
+        assert one.mbit_s is not None
+        assert one.mbit_s > 0
+
+
+def test_a_live_run_that_dropped_much_can_be_had_again(recording: Recording) -> None:
+    """Images come every 33 us, and nobody waits: of each robot's all but the first are late."""
+    truth = Truth.open(recording.path)
+    radio = RadioLimits(loss=1.0)
+    live, drops = run_live(recording, truth, SETUP, 0, Playback(1000.0, 0, radio=radio))
+    summary = told(live)
+    assert summary.ground.dropped == len(drops.dropped.ground) >= 1
+    assert summary.mav.dropped == len(drops.dropped.mav) >= 1
+    assert summary.mav.lost == len(drops.unmapped.mav) == 4 - summary.mav.dropped
+    assert summary.mav.mapped_ms.n == 0
+    assert_same(live, run_recording(recording, truth, SETUP, 0, drops))
+
+
+def assert_same(one: RunResult, two: RunResult) -> None:
+    """To the bit: the map, and every pose when it was first said."""
+    clouds = [result.augmented.cloud_ground for result in (one, two)]
+    assert len(clouds[0]) > 100
+    assert clouds[0].points.tobytes() == clouds[1].points.tobytes()
+    for robot in ("mav", "ground"):
+        said = [result.tracked[robot].front_end.live_poses() for result in (one, two)]
+        assert said[0]
+        for (one_ns, one_pose), (two_ns, two_pose) in zip(*said, strict=True):
+            assert one_ns == two_ns
+            assert one_pose.matrix().tobytes() == two_pose.matrix().tobytes()
+
+
+class Running:
+    """`airground run --realtime` in a process of its own, its images 3 s apart."""
+
+    def __init__(self, recording: Recording, out: Path) -> None:
+        words = ["run", str(recording.path), "--out", str(out), "--poses", "oracle"]
+        words += ["--realtime", "--split", "--rate", "0.01"]
+        script = (
+            "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+            "from evaluation.cli import main; main()"
+        )
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", script, *words], stderr=subprocess.PIPE, text=True
+        )
+        wait_until(lambda: len(self.robots()) == 2)
+        self.children = self.robots()
+        # Both are playing once they hold the sockets that they send through.
+        wait_until(lambda: all(self.is_connected(child) for child in self.children.values()))
+
+    def robots(self) -> dict[str, int]:
+        """The trackers' processes, by the socket files that they were handed."""
+        pid = self.process.pid
+        text = Path(f"/proc/{pid}/task/{pid}/children").read_text()
+        named = {}
+        for child in map(int, text.split()):
+            with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # gone meanwhile
+                if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes():
+                    named[f"{child}"] = child
+        return named
+
+    def is_connected(self, pid: int) -> bool:
+        links = []
+        for fd in os.listdir(f"/proc/{pid}/fd"):
+            with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # closed meanwhile
+                links.append(os.readlink(f"/proc/{pid}/fd/{fd}"))
+        return "anon_inode:[eventpoll]" in links
+
+    def finish(self) -> tuple[int, str]:
+        _, said = self.process.communicate(timeout=PATIENCE_S * 3)
+        return self.process.returncode, said
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + PATIENCE_S * 3
+    while not condition():
+        assert time.monotonic() < deadline, "it took too long"
+        time.sleep(0.1)
+
+
+def is_gone(pid: int) -> bool:
+    """Ended, and not only waiting to be buried by a parent that is no longer there."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+    except FileNotFoundError:
+        return True
+
+
+def test_an_interrupt_ends_all_processes_and_leaves_nothing(
+    recording: Recording, tmp_path: Path
+) -> None:
+    running = Running(recording, tmp_path / "out")
+    running.process.send_signal(signal.SIGINT)
+    code, said = running.finish()
+    assert code == console.EXIT_INTERRUPTED, said
+    assert said.splitlines()[-1] == "airground: error: interrupted"
+    wait_until(lambda: all(is_gone(child) for child in running.children.values()))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_nobody_outlives_a_run_that_is_killed(recording: Recording, tmp_path: Path) -> None:
+    running = Running(recording, tmp_path / "out")
+    running.process.kill()
+    running.finish()
+    wait_until(lambda: all(is_gone(child) for child in running.children.values()))
+
+
+def test_a_robot_that_dies_stops_nobody_and_is_reported(
+    recording: Recording, tmp_path: Path
+) -> None:
+    running = Running(recording, tmp_path / "out")
+    os.kill(max(running.children.values()), signal.SIGKILL)  # started last: the MAV
+    code, said = running.finish()
+    assert code == console.EXIT_OK, said
+    live = json.loads((tmp_path / "out" / "summary.json").read_text())["realtime"]
+    assert (live["mav"]["survived"], live["ground"]["survived"]) == (0, 1)
+    assert live["ground"]["posed_ms"]["n"] == 4
+    assert live["ground"]["mapped_ms"]["n"] == 4

@@ -1,0 +1,129 @@
+"""One robot alone, from plain folders to trajectories that evo reads."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from evo.tools import file_interface
+
+from airground.errors import RecordingError
+from airground.io.tum import read_tum, write_tum
+from evaluation import cli
+from evaluation.setup import console
+from evaluation.table.true_camera import read_euroc_poses
+from tests.evaluation.plain_recordings import write_euroc_folder, write_tum_folder
+from tests.slam.synthetic_world import ground_sequence, mav_sequence
+
+FRAMES = 15
+
+
+@pytest.fixture(scope="module")
+def tum(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_tum_folder(tmp_path_factory.mktemp("tum"), ground_sequence(FRAMES))
+
+
+@pytest.fixture(scope="module")
+def euroc(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_euroc_folder(tmp_path_factory.mktemp("euroc"), mav_sequence(FRAMES))
+
+
+def airground(*words: object) -> int:
+    with pytest.raises(SystemExit) as ended:
+        cli.main([str(word) for word in words])
+    assert isinstance(ended.value.code, int)
+    return ended.value.code
+
+
+def summary(folder: Path) -> dict[str, Any]:
+    return json.loads((folder / "summary.json").read_text())
+
+
+def test_a_tum_folder_is_tracked_and_measured(tum: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = ("run", tum, "--only", "ground", "--front-end", "opencv", "--out", out)
+    assert airground(*words) == console.EXIT_OK
+    told = summary(out)
+    assert told["layout"] == "tum"
+    assert told["pose_frame"] == "camera"
+    assert told["tracked_fraction"] == 1.0
+    assert told["error"]["final"]["poses"] == FRAMES
+    assert told["error"]["final"]["ate_se3_rmse_m"] < 0.005
+    assert told["frame_ms"]["median"] > 0
+    for name in ("trajectory", "trajectory_live"):
+        path = file_interface.read_tum_trajectory_file(str(out / f"{name}.tum"))
+        stamps = [image.stamp_ns / 1e9 for image in ground_sequence(FRAMES).images]
+        np.testing.assert_allclose(path.timestamps, stamps)
+
+
+def test_an_euroc_folder_is_tracked_and_measured(euroc: Path, tmp_path: Path) -> None:
+    """Poses of the camera go in; those of the body come out, as EuRoC states them."""
+    sequence = mav_sequence(FRAMES)
+    write_tum(tmp_path / "poses.tum", sequence.T_world_camera)
+    out = tmp_path / "out"
+    words = ("run", euroc / "mav0", "--only", "mav", "--front-end", "file")
+    assert airground(*words, "--trajectory", tmp_path / "poses.tum", "--out", out) == 0
+    told = summary(out)
+    assert told["pose_frame"] == "body"
+    assert told["error"]["live"]["ate_se3_rmse_m"] < 1e-6
+    body = read_tum(out / "trajectory.tum")
+    T_camera_body = sequence.calibration.T_imu_camera.inverse()
+    for index in (0, FRAMES - 1):
+        expected = sequence.T_world_camera[index] @ T_camera_body
+        np.testing.assert_allclose(body[index].translation, expected.translation, atol=1e-6)
+        np.testing.assert_allclose(body[index].rotation, expected.rotation, atol=1e-6)
+
+
+def test_without_truth_there_is_a_trajectory_but_no_error(tum: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "no_truth"
+    shutil.copytree(tum, folder, ignore=shutil.ignore_patterns("groundtruth.txt"))
+    out = tmp_path / "out"
+    words = ("run", folder, "--only", "ground", "--front-end", "opencv", "--out", out)
+    assert airground(*words) == 0
+    assert summary(out)["error"] == {"final": None, "live": None}
+
+
+BAD_WORDS = {
+    "both robots": ((), "one alone from EuRoC or TUM RGB-D with --only"),
+    "wrong front end": (("--only", "mav", "--front-end", "opencv"), "known: slam, file"),
+    "front end": (("--only", "ground", "--front-end", "orb"), "known: slam, open3d, opencv, file"),
+    "no file": (("--only", "ground", "--front-end", "file"), "--trajectory FILE go together"),
+    "front end of both": (("--front-end", "opencv"), "only with --only"),
+    "calibration of both": (("--calibration", "x.yaml"), "--calibration: only with --only"),
+    "no such calibration": (("--only", "ground", "--calibration", "x.yaml"), "x.yaml: this file"),
+}
+
+
+@pytest.mark.parametrize("what", BAD_WORDS)
+def test_wrong_words_are_one_line_and_leave_nothing(
+    tum: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], what: str
+) -> None:
+    words, message = BAD_WORDS[what]
+    assert airground("run", tum, *words, "--out", tmp_path / "out") == console.EXIT_ERROR
+    error = capsys.readouterr().err
+    assert error.startswith("airground: error: ")
+    assert error.count("\n") == 1
+    assert message in error
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_quaternion_that_is_not_of_unit_length_is_named(
+    euroc: Path, tum: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = (euroc / "mav0/state_groundtruth_estimate0/data.csv").read_text().splitlines()
+    fields = text[3].split(",")
+    fields[4:8] = ["0.5", "0.5", "0.5", "0.6"]
+    (tmp_path / "data.csv").write_text("\n".join([*text[:3], ",".join(fields)]) + "\n")
+    with pytest.raises(
+        RecordingError, match=rf"data\.csv: the quaternion .*{fields[0]}.* length 1"
+    ):
+        read_euroc_poses(tmp_path / "data.csv")
+    poses = tmp_path / "poses.tum"
+    poses.write_text("1.0 0 0 0 0.5 0.5 0.5 0.6\n")
+    words = ("run", tum, "--only", "ground", "--front-end", "file", "--trajectory", poses)
+    assert airground(*words, "--out", tmp_path / "out") == console.EXIT_ERROR
+    assert "poses.tum:1: the quaternion (qx qy qz qw) must have length 1" in capsys.readouterr().err

@@ -1,0 +1,185 @@
+"""Figures show what the data says: failures, medians, orientation, true colours."""
+
+import dataclasses
+import hashlib
+import re
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from airground.core.cloud import PointCloud
+from airground.core.se3 import SE3
+from evaluation.measure.showcase.showcase import Showcase
+from evaluation.show.figures.augmented_map import refinement_figure
+from evaluation.show.figures.boxes import draw_box, log_axis
+from evaluation.show.figures.depth_maps import completeness, depth_maps_figure
+from evaluation.show.figures.height_maps import draw_grid, height_maps_figure
+from evaluation.show.figures.localization_error import localization_error_figure
+from evaluation.show.figures.particles import covariance_ellipse, particles_figure
+from evaluation.show.figures.refinement_error import BeforeAfter, refinement_translation_figure
+from evaluation.show.figures.style import COLUMN_IN, SMALL_PT, WIDE_IN, save_figure
+from evaluation.show.figures.timing import timing_figure
+from evaluation.show.report.figures import report_figures
+from tests.evaluation.synthetic_results import BEST, PAPER, make_showcase, make_table
+
+
+@pytest.fixture(scope="module")
+def showcase() -> Showcase:
+    return make_showcase(scale=4)
+
+
+def _texts(figure: Figure) -> list[str]:
+    from matplotlib.text import Text
+
+    return [text.get_text() for text in figure.findobj(Text) if isinstance(text, Text)]
+
+
+def test_failures_are_counted_above_a_box() -> None:
+    figure = Figure()
+    axes = figure.subplots()
+    log_axis(axes, [[0.1, 0.2, np.nan, np.inf]], floor=1e-3)
+    draw_box(axes, 1.0, [0.1, 0.2, np.nan, np.inf], 0.5, "black")
+    assert "2✕" in _texts(figure)
+
+
+def test_a_box_that_failures_reach_ends_at_the_top_of_the_axis() -> None:
+    axes = Figure().subplots()
+    values = [0.1, 0.2, np.nan, np.nan]
+    log_axis(axes, [values], floor=1e-3)
+    draw_box(axes, 1.0, values, 0.5, "black")
+    outline = axes.lines[0].get_ydata()
+    assert np.max(outline) == pytest.approx(axes.get_ylim()[1])
+
+
+def test_every_outlier_is_drawn() -> None:
+    axes = Figure().subplots()
+    values = np.append(np.linspace(0.1, 0.11, 30), [5.0, 7.0])
+    log_axis(axes, [values], floor=1e-3)
+    draw_box(axes, 1.0, values, 0.5, "black")
+    np.testing.assert_array_equal(np.sort(axes.lines[-1].get_ydata()), [5.0, 7.0])
+
+
+def test_all_failed_still_draws() -> None:
+    figure = localization_error_figure({"lost": np.full((3, 12), np.nan)})
+    assert _texts(figure).count("3✕") == 12
+
+
+def test_fig11_shows_the_papers_two_points() -> None:
+    figure = localization_error_figure({"a": np.full((4, 12), 0.1)})
+    assert {"paper 65%", "paper 89%"} <= set(_texts(figure))
+
+
+def test_fig13_writes_medians_and_the_papers() -> None:
+    figure = refinement_translation_figure({"a": BeforeAfter([0.3, 0.31, 0.32], [0.004, 0.003])})
+    assert {"0.31", "0.0035", "paper\n0.076 m"} <= set(_texts(figure))
+
+
+def test_timing_says_what_was_not_run() -> None:
+    figure = timing_figure({"icp": np.array([100.0, 120.0])})
+    texts = _texts(figure)
+    assert "ICP alignment" in texts
+    assert texts.count("not run") == 8
+    assert "Height maps" not in texts
+
+
+def test_grids_are_drawn_with_x_right_and_y_up() -> None:
+    axes = Figure().subplots()
+    cells = np.zeros((3, 2))
+    cells[2, 0] = 1.0
+    shown = draw_grid(axes, cells, np.array([1.0, 5.0]), 10.0, "gray")
+    assert shown.get_array().shape == (2, 3)
+    assert shown.get_array()[0, 2] == 1.0
+    assert shown.origin == "lower"
+    np.testing.assert_allclose(shown.get_extent(), [0.95, 1.25, 4.95, 5.15])
+
+
+@pytest.mark.parametrize("angle", [0.3, -1.1, 2.0])
+def test_the_ellipse_follows_the_covariance(angle: float) -> None:
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    covariance = turn @ np.diag([0.04, 0.01]) @ turn.T
+    ellipse = covariance_ellipse(np.array([1.0, 2.0]), covariance)
+    corner = ellipse.get_patch_transform().transform([[0, 1]])[0] - [1.0, 2.0]
+    # The larger half axis is 2 sigma long and points along the larger eigenvector.
+    assert np.linalg.norm(corner) == pytest.approx(0.4)
+    assert abs(corner @ turn[:, 0]) == pytest.approx(0.4)
+
+
+def test_completeness_is_the_share_of_pixels_with_depth() -> None:
+    assert completeness(np.array([[0.1, np.nan], [np.nan, np.nan]])) == 0.25
+
+
+def test_refinement_is_cut_where_both_maps_have_the_heap(showcase: Showcase) -> None:
+    def cloud(*heaps: tuple[float, float]) -> PointCloud:
+        """A floor of 2 x 2 m with heaps, 0.3 m square and high, at (x, y)."""
+        x, y = (axis.ravel() for axis in np.meshgrid(*[np.linspace(-1, 1, 101)] * 2))
+        near = [(abs(x - hx) <= 0.15) & (abs(y - hy) <= 0.15) for hx, hy in heaps]
+        z = 0.3 * np.any(near, axis=0)
+        return PointCloud(np.stack([x, y, z], axis=1), np.zeros((len(x), 3), np.uint8))
+
+    shift = SE3(np.eye(3), np.array([0.2, 0.0, 0.1]))
+    surface = dataclasses.replace(showcase.surface, cloud_mav=cloud((0.0, 0.5), (0.5, -0.8)))
+    seen = cloud((0.2, 0.5), (-0.5, 0.0))  # the first heap, where `shift` puts it, and another
+    seen = dataclasses.replace(seen, points=seen.points + np.array([0, 0, 0.1], np.float32))
+    both = dataclasses.replace(showcase, surface=surface, ground_cloud=seen)
+    before, after = refinement_figure(both, shift).axes
+    for axes, offset in ((before, 0.2), (after, 0.0)):
+        aerial, ground = (np.asarray(drawn.get_offsets()) for drawn in axes.collections)
+        tops = [points[points[:, 1] > points[:, 1].min() + 0.2, 0] for points in (aerial, ground)]
+        assert tops[1].min() == pytest.approx(0.05, abs=0.03)
+        assert tops[1].min() - tops[0].min() == pytest.approx(offset, abs=0.03)
+
+
+def test_pictures_of_a_flight_state_their_numbers(showcase: Showcase) -> None:
+    assert any("of pixels" in text for text in _texts(depth_maps_figure(showcase)))
+    assert "lowest cost" in _texts(height_maps_figure(showcase))
+    assert any("spread" in text for text in _texts(particles_figure(showcase.steps)))
+
+
+def test_the_same_figure_gives_the_same_bytes(tmp_path: Path) -> None:
+    def digests(folder: str) -> list[str]:
+        figure = refinement_translation_figure({"a": BeforeAfter([0.3, 0.2], [0.01, 0.02])})
+        save_figure(figure, tmp_path / folder, "f")
+        return [
+            hashlib.sha256((tmp_path / folder / f"f.{ending}").read_bytes()).hexdigest()
+            for ending in ("png", "pdf")
+        ]
+
+    assert digests("one") == digests("two")
+
+
+def test_every_figure_fits_a_paper(showcase: Showcase, tmp_path: Path) -> None:
+    table = make_table(conditions=(BEST, PAPER), sequences=3)
+    drawn = list(report_figures(table, [BEST, PAPER], showcase))
+    assert len(drawn) >= 11
+    for one in drawn:
+        save_figure(one.figure, tmp_path, one.name)
+        pdf = (tmp_path / f"{one.name}.pdf").read_bytes()
+        (box,) = re.findall(rb"/MediaBox \[ ?0 0 ([\d.]+) ", pdf)
+        assert float(box) / 72 == pytest.approx(WIDE_IN if one.wide else COLUMN_IN), one.name
+        assert b"/Type3" not in pdf, one.name
+        assert b"/FontFile2" in pdf, one.name
+        sizes = font_sizes_pt(pdf)
+        assert min(sizes) >= SMALL_PT, (one.name, sorted(sizes))
+
+
+def font_sizes_pt(pdf: bytes) -> set[float]:
+    """The sizes in which the text of a file of matplotlib's is set."""
+    sizes: set[float] = set()
+    for packed in re.findall(rb"stream\r?\n(.*?)\r?\nendstream", pdf, re.DOTALL):
+        try:
+            unpacked = zlib.decompress(packed)
+        except zlib.error:
+            continue
+        sizes |= {float(size) for size in re.findall(rb"/F\d+ ([\d.]+) Tf", unpacked)}
+    return sizes
+
+
+def test_errors_below_the_limits_keep_the_limits_on_the_axis() -> None:
+    errors = np.full((3, 24), 0.02)
+    figure = localization_error_figure({"one": errors})
+    boxes, near, _ = figure.axes
+    assert boxes.get_ylim()[1] > 0.5
+    assert len(near.get_xticks()) <= 14

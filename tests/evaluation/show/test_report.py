@@ -1,0 +1,255 @@
+"""The report: self-contained, complete, honest about what failed."""
+
+import base64
+import io
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from evaluation.setup.condition import Condition
+from evaluation.setup.run_info import RunInfo
+from evaluation.show.report.failures import control_table, failures
+from evaluation.show.report.figures import report_figures
+from evaluation.show.report.headline import headlines
+from evaluation.show.report.page import write_report
+from evaluation.show.report.tables import (
+    claims,
+    comparison_table,
+    degrees,
+    metres,
+    posed_at,
+    scene_table,
+    timing_table,
+)
+from evaluation.show.report.trajectories import trajectory_figures, trajectory_table
+from evaluation.table.rows import ResultTable, Row
+from tests.evaluation.synthetic_results import BEST, DRIFT, MINMAX, PAPER, SCENES, make_table
+
+RUN = RunInfo("0.1.0", "abc1234", 7, "some <processor>", 2)
+
+
+@pytest.fixture(scope="module")
+def table() -> ResultTable:
+    return make_table(conditions=(BEST, PAPER, MINMAX))
+
+
+@pytest.fixture(scope="module")
+def page(table: ResultTable, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    out = tmp_path_factory.mktemp("report")
+    write_report(out, table, None, RUN, notes=["Something <missed> its mark."])
+    return out, (out / "report.html").read_text(encoding="utf-8")
+
+
+def test_the_page_needs_nothing_from_outside(page: tuple[Path, str]) -> None:
+    _, html = page
+    assert re.findall(r'(?:src|href)="(?!data:|#)[^"]*"', html) == []
+    assert "<script" not in html
+    assert not re.search(r"url\(|@import", html)
+
+
+def test_captions_say_where_refinements_started(table: ResultTable) -> None:
+    def captions(shown: ResultTable) -> list[str]:
+        drawn = report_figures(shown, [BEST], None)
+        return [figure.caption for figure in drawn if "refinement" in figure.name]
+
+    of_a_run = table.frame[~table.frame["metric"].str.startswith("from_truth")]
+    assert all("start from the true pose with Gaussian noise" in c for c in captions(table))
+    assert all("where the particles place it" in c for c in captions(ResultTable(of_a_run)))
+
+
+def test_every_figure_is_embedded_and_saved(page: tuple[Path, str]) -> None:
+    out, html = page
+    embedded = re.findall(r'src="data:image/webp;base64,([^"]+)"', html)
+    saved = sorted(path.stem for path in (out / "figures").glob("*.png"))
+    assert saved == sorted(path.stem for path in (out / "figures").glob("*.pdf"))
+    assert saved == [
+        "calibration",
+        "fig11_localization_error",
+        "fig12_spread",
+        "fig13_refinement_translation",
+        "fig14_refinement_angle",
+        "table1_timing",
+    ]
+    assert len(embedded) == len(saved)
+    for data in embedded:
+        assert Image.open(io.BytesIO(base64.b64decode(data))).format == "WEBP"
+    assert len(html) < 8e6
+
+
+def test_text_from_outside_is_escaped(page: tuple[Path, str]) -> None:
+    _, html = page
+    assert "some &lt;processor&gt;" in html
+    assert "Something &lt;missed&gt; its mark." in html
+
+
+def test_the_page_says_that_it_is_simulated_and_under_which_conditions(
+    page: tuple[Path, str],
+) -> None:
+    _, html = page
+    assert "Same protocol, simulated." in html
+    assert BEST.label() in html
+    for published in ("89 %", "65 %", "76 mm", "3.0°"):
+        assert published in html
+
+
+def test_the_comparison_has_a_column_for_the_paper_and_each_condition(table: ResultTable) -> None:
+    made = comparison_table(table, table.conditions())
+    assert made.header == ("", "paper (real robots)", "preset best", "preset paper",
+                           "preset paper (sigma of the scaled cost)")  # fmt: skip
+    assert {len(row) for row in made.rows} == {5}
+    cells = {row[0]: row for row in made.rows}
+    errors = table.of(PAPER).without_controls().sequences("error_m")[4].to_numpy(float)
+    good = int((errors <= 0.25).sum())
+    assert f"{good} of {len(errors)};" in cells["within 0.25 m after 4"][3]
+    assert cells["refined, median"][1] == "76 mm, 3.0°"
+
+
+def test_claims_and_calibration_have_their_sections(page: tuple[Path, str]) -> None:
+    _, html = page
+    for anchor in ("claims", "calibration_table", "calibration"):
+        assert html.count(f'id="{anchor}"') == 1
+    assert html.count('href="#claims"') == html.count('href="#calibration_table"') == 1
+    assert "another scene&#39;s ground map" in html
+    assert "true position in the 90 % ellipse" in html
+
+
+def test_what_nobody_measured_has_no_row(table: ResultTable) -> None:
+    names = [row[0] for row in comparison_table(table, [BEST]).rows]
+    assert "MAV poses, RMS error" not in names
+
+
+def test_poses_that_nobody_tracked_have_no_table(table: ResultTable) -> None:
+    assert trajectory_table(table, [BEST]).rows == ()
+
+
+def test_drift_is_shown_where_it_was_measured() -> None:
+    rows = [Row("indoor_a", 1, 0, DRIFT, "trajectory", "mav_ate_se3_rmse_m", 0.0123, "m")]
+    made = comparison_table(ResultTable.from_rows(rows), [DRIFT])
+    assert ("MAV poses, live, RMS after SE3", "12 mm", "12.3 mm") in made.rows
+
+
+def test_a_place_with_the_wrong_heading_is_not_a_pose() -> None:
+    off = [(0.1, 2.9), (0.1, 3.1), (0.3, 1.0), (np.nan, np.nan)]
+    rows = [
+        Row("indoor_a", 1, 0, BEST, "localization", metric, value, unit, n, iteration=4)
+        for n, errors in enumerate(off)
+        for metric, value, unit in zip(("error_m", "error_deg"), errors, ("m", "deg"), strict=True)
+    ]
+    made = posed_at(ResultTable.from_rows(rows), 4, 0.25, 3.0)
+    assert (made.successes, made.total) == (1, 4)
+    without = [row for row in rows if row.metric != "error_deg"]
+    assert posed_at(ResultTable.from_rows(without), 4, 0.25, 3.0).total == 0
+
+
+def test_every_failure_is_listed_with_its_reason(table: ResultTable) -> None:
+    part = table.of(PAPER).without_controls()
+    made = failures(part)
+    errors = part.sequences("error_m")[4].to_numpy(float)
+    listed = [failure for failure in made if failure.kind == "sequence"]
+    assert len(listed) == int((~(errors <= 0.25)).sum())
+    assert all(failure.said for failure in made)
+    assert len({failure.key for failure in made}) == len(made)
+
+
+def test_every_failure_leads_to_what_happened(table: ResultTable, page: tuple[Path, str]) -> None:
+    _, html = page
+    listed = failures(table.of(BEST).without_controls())
+    assert listed
+    for failure in listed:
+        assert html.count(failure.title) == 1
+    hopeless = failures(table.of(PAPER).without_controls())
+    sequence = next(failure for failure in hopeless if failure.kind == "sequence")
+    assert [row[0] for row in sequence.story.rows] == [str(n) for n in range(1, 13)]
+    assert sequence.result.startswith(sequence.story.rows[3][1])
+
+
+def test_a_sequence_without_estimate_is_a_failure() -> None:
+    rows = [
+        Row("indoor_a", 1, 0, BEST, "localization", metric, value, "", 0, i, note="no overlap")
+        for i in range(1, 5)
+        for metric, value in (("error_m", np.nan), ("converged", 0.0))
+    ]
+    (made,) = failures(ResultTable.from_rows(rows))
+    assert made.title == "sequence 0 of indoor_a, seed 1, flight 0"
+    assert made.result == "no estimate after 4"
+    assert made.said == "no overlap"
+
+
+def test_claims_are_counted_and_checked() -> None:
+    rows = []
+    for sequence, (error, converged) in enumerate([(0.1, 1), (0.9, 1), (0.9, 0), (np.nan, 0)]):
+        for metric, value in (("error_m", error), ("converged", converged)):
+            rows.append(Row("a", 1, 0, BEST, "localization", metric, value, "", sequence, 1))
+    claimed, wrong = claims(ResultTable.from_rows(rows))
+    assert (claimed.successes, claimed.total) == (2, 4)
+    assert (wrong.successes, wrong.total) == (1, 2)
+
+
+def test_the_control_scene_is_judged_by_what_it_claims(table: ResultTable) -> None:
+    made = control_table(table, table.conditions())
+    assert [row[2] for row in made.rows] == ["0 of 3"] * 3
+    assert "particles are spread" in made.rows[0][3]
+
+
+def test_scenes_stand_side_by_side(table: ResultTable) -> None:
+    made = scene_table(table.of(BEST).without_controls())
+    assert [row[0] for row in made.rows] == list(SCENES)
+
+
+def test_the_timing_table_says_what_was_not_run(table: ResultTable) -> None:
+    rows = {row[0]: row for row in timing_table(table.of(BEST)).rows}
+    assert rows["Egomotion: Monocular SLAM, a frame"][1:] == ("14 (CPU)", "not run", "-", "-", "0")
+    assert rows["Dense reconstruction: Fusion, 8 iterations"][1] == "800 (GPU)"
+
+
+def test_headlines_leave_out_what_was_not_measured(table: ResultTable) -> None:
+    measured = table.of(BEST).without_controls()
+    assert len(headlines(measured, 0)) == 7
+    only_timing = ResultTable(measured.frame[measured.frame["stage"] == "timing"])
+    assert headlines(only_timing, 0) == []
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0123, "12.3 mm"), (0.25, "0.25 m"), (np.inf, "failed"), (np.nan, "-"), (0.0, "0.0 mm")],
+)
+def test_lengths_are_written_for_people(value: float, text: str) -> None:
+    assert metres(value) == text
+
+
+def test_angles_are_written_for_people() -> None:
+    assert (degrees(0.123), degrees(np.inf)) == ("0.12°", "failed")
+
+
+def test_poses_from_slam_get_figures_and_a_table_with_their_alignment() -> None:
+    condition = Condition("best", "slam", "nominal", "known")
+    rows = []
+    for seed, size in enumerate((0.004, 0.02, 0.006)):
+        where = ("indoor_a", seed, 0, condition)
+        rows += [
+            Row(*where, "trajectory", "mav_ate_se3_rmse_m", size, "m"),
+            Row(*where, "trajectory", "mav_scale_error", -size, ""),
+            Row(*where, "trajectory", "mav_path_m", 20.0, "m"),
+        ]
+        for tenth in range(30):
+            error = float("nan") if tenth < 5 else size
+            for metric in ("mav_error_m", "mav_final_error_m"):
+                time_s = tenth / 10
+                rows.append(Row(*where, "trajectory_error", metric, error, "m", time_s=time_s))
+    table = ResultTable.from_rows(rows)
+    (figure,) = trajectory_figures(table, condition)
+    assert figure.name == "fig09_mav_error"
+    titles = [axes.get_title(loc="left") for axes in figure.figure.axes]
+    assert titles == [
+        "median run (indoor_a, seed 2, flight 0): RMS 0.60 cm live, 0.60 cm final",
+        "worst run (indoor_a, seed 1, flight 0): RMS 2.00 cm live, 2.00 cm final",
+    ]
+    cells = {row[0]: row[1:] for row in trajectory_table(table, [condition]).rows}
+    assert cells["MAV: live, RMS error"] == (
+        "SE3, scale not corrected", "12 mm", "6.0 mm\nworst of 3: 20.0 mm",
+    )  # fmt: skip
+    assert cells["MAV: live, scale error (absolute)"][2] == "0.60 %\nworst of 3: 2.00 %"
+    assert not any(name.startswith("ground") for name in cells)
