@@ -32,7 +32,7 @@ from sim.sensors.imu import measure_imu
 from sim.sensors.magnetometer import measure_field
 from sim.sensors.miscalibration import CAMERA_RATE_HZ, MAGNETOMETER_RATE_HZ, calibrate
 from sim.sensors.presets import SensorPreset
-from sim.world.world.world import build_world
+from sim.world.world import build_world
 
 # The cameras share no trigger; no exposure may reach beyond the motion.
 FIRST_IMAGE_NS: dict[Robot, int] = {"mav": 50_000_000, "ground": 55_000_000}

@@ -25,7 +25,7 @@ from airground.io.header import parse_table, read_toml, write_toml
 from airground.io.layout import TRUTH
 from airground.io.tum import write_tum
 from sim.robots.motion import ROBOTS, Motion, Robot
-from sim.world.world.world import World
+from sim.world.world import World
 
 
 @dataclass(frozen=True, eq=False)

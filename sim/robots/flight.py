@@ -20,7 +20,7 @@ from sim.robots.quadrotor import (
 )
 from sim.robots.robot_motion import RobotMotion
 from sim.scene import MavPath
-from sim.world.world.magnetic_field import MagneticField
+from sim.world.magnetic_field import MagneticField
 
 RISE_S = 3.0
 SPIN_UP_S = 0.7

@@ -18,7 +18,7 @@ from airground.errors import InputError
 from sim.robots.paths import SmoothCurve, WaypointPath, heading_path, random_curve
 from sim.robots.robot_motion import Mounting, RobotMotion, ideal_imu
 from sim.scene import GroundPath
-from sim.world.world.magnetic_field import MagneticField
+from sim.world.magnetic_field import MagneticField
 
 FloorHeight = Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]
 """Height of the floor [m] at x, y [m] in `world`; NaN where there is none."""

@@ -18,8 +18,8 @@ from sim.robots.ground_robot import drive, floor_under, mounting, plan_drive
 from sim.robots.overlap import driven_path
 from sim.robots.robot_motion import ARRAY_NAMES, Mounting, RobotMotion
 from sim.scene import Scene
-from sim.world.world.magnetic_field import room_field
-from sim.world.world.world import World
+from sim.world.magnetic_field import room_field
+from sim.world.world import World
 
 Robot = Literal["mav", "ground"]
 ROBOTS: tuple[Robot, ...] = ("mav", "ground")

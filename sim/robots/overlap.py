@@ -16,7 +16,7 @@ from airground.errors import InputError
 from sim.geometry.ray_caster import RayCaster
 from sim.robots.paths import cut_headings, heading_path, planar_path
 from sim.scene import GroundPath, Scene, load_scene
-from sim.world.world.world import World, build_world
+from sim.world.world import World, build_world
 
 CELL_M = 0.04
 GROUND_RANGE_M = 4.0

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from airground.core.arrays import read_only
 from airground.core.se3 import SE3, nearest_rotation
-from sim.world.world.magnetic_field import MagneticField
+from sim.world.magnetic_field import MagneticField
 
 GRAVITY_WORLD = np.array([0.0, 0.0, -9.81])
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airground.errors import InputError
-from sim.world.world.magnetic_field import EARTH_FIELD_WORLD
+from sim.world.magnetic_field import EARTH_FIELD_WORLD
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ from sim.geometry.rubble import Box, make_heap
 from sim.geometry.surface import Mesh, box_mesh, join
 from sim.geometry.terrain import HeightField, make_terrain
 from sim.scene import Scene, Terrain
-from sim.world.world.outdoor import add_ground, add_rocks
-from sim.world.world.room import add_room, room_mesh
+from sim.world.outdoor import add_ground, add_rocks
+from sim.world.room import add_room, room_mesh
 
 # Mean linear reflectance of what bounces light.
 _CONCRETE = (0.32, 0.31, 0.29)

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.robots.motion import Motion, simulate_motion
 from sim.scene import GroundPath, MavPath, Room, Scene
-from sim.world.world.world import World
+from sim.world.world import World
 
 STEP_S = 0.005
 MAV: dict[str, Any] = {

@@ -4,7 +4,7 @@ import numpy as np
 
 from sim.recording.recorder import image_stamps
 from sim.scene import Scene
-from sim.world.world.world import World, build_world
+from sim.world.world import World, build_world
 
 SCENE = """
 name = "small"

@@ -10,7 +10,7 @@ from sim.geometry.edges import Edges, find_edges
 from sim.geometry.surface import box_mesh, join, rectangle_mesh
 from sim.geometry.terrain import HeightField
 from sim.scene import load_scene
-from sim.world.world.world import build_world
+from sim.world.world import build_world
 
 AT = SE3.from_rotation_vector((0.3, -0.5, 0.2), (1.0, 2.0, 3.0))
 

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 from airground.errors import InputError
 from sim.robots.ground_robot import drive, mounting, plan_drive
 from sim.robots.motion import ROBOTS, STEP_NS, Motion
-from sim.world.world.magnetic_field import EARTH_FIELD_WORLD, MagneticField, room_field
+from sim.world.magnetic_field import EARTH_FIELD_WORLD, MagneticField, room_field
 from tests.sim.flights import STEP_S, Floor, simulate, small_scene
 from tests.sim.strapdown import imu_state, integrate_imu
 

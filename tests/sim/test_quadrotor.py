@@ -7,7 +7,7 @@ from airground.errors import InputError
 from sim.robots.flight import fly, plan_flight
 from sim.robots.quadrotor import INERTIA, MASS_KG, MOUNTING, quadrotor_model
 from sim.robots.robot_motion import ideal_imu
-from sim.world.world.magnetic_field import room_field
+from sim.world.magnetic_field import room_field
 from tests.sim.flights import MAV, STEP_S, small_scene
 from tests.sim.strapdown import imu_state, integrate_imu
 

@@ -18,7 +18,7 @@ from sim.recording.recorder import image_stamps, record
 from sim.recording.truth import Truth
 from sim.scene import parse_scene
 from sim.sensors.presets import NOMINAL, NONE, SensorPreset
-from sim.world.world.world import build_world
+from sim.world.world import build_world
 from tests.sim.small_flight import FRAMES, SCENE, few_stamps, plain_world
 
 

@@ -7,7 +7,7 @@ import pytest
 from sim.geometry.ray_caster import RayCaster
 from sim.geometry.surface import BOX_CORNERS, BOX_TRIANGLES, join, rectangle_mesh
 from sim.scene import load_scene
-from sim.world.world.world import World, build_world
+from sim.world.world import World, build_world
 
 
 @pytest.fixture(scope="module", params=["tiny", "outdoor", "flat"])

@@ -10,7 +10,7 @@ from sim.appearance.bake_light import LightBaker
 from sim.appearance.pictures import CUBE_FACES, add_picture
 from sim.geometry.surface import box_mesh, join, rectangle_mesh
 from sim.scene import Light, Scene, load_scene
-from sim.world.world.world import World, build_world
+from sim.world.world import World, build_world
 
 
 def small(name: str = "tiny", **changes: object) -> Scene:
