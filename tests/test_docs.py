@@ -1,7 +1,9 @@
-"""What the documentation names is there: files, parameters, verbs."""
+"""Files, modules, parameters and verbs named in the documentation exist."""
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
 import re
 import runpy
 from collections.abc import Iterator
@@ -27,6 +29,18 @@ PARAMETER = re.compile(rf"\b({'|'.join(n for n in SECTIONS if n != 'preset')})\.
 def page(request: pytest.FixtureRequest) -> Path:
     return request.param
 
+PATH = re.compile(r"(?<![\w/.-])(?:\.\./)?((?:airground|sim|evaluation|tests|scenes|docs)/[\w/.*-]*\w)")
+DOTTED = re.compile(r"(?<![\w/.-])((?:airground|sim|evaluation)(?:\.\w+)+)")
+IMPORT = re.compile(r"^\s*from ((?:airground|sim|evaluation)[\w.]*) import ([\w, ]+)$", re.MULTILINE)
+WRITTEN_BY_THE_READER = {
+    "evaluation/measure/baselines/highest_heap.py",
+    "evaluation.measure.baselines.highest_heap",
+}
+"""The file that add_a_baseline.md asks its reader to write."""
+NOT_FOR_PROGRAMS = re.compile(
+    r"\b(nobody|somebody|anybody|everybody|told|tells|lived|wanting)\b", re.IGNORECASE
+)
+
 
 def without_code(text: str) -> str:
     return re.sub(r"```.*?```", "", text, flags=re.DOTALL)
@@ -50,6 +64,54 @@ def headings(file: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", one.lower()).replace(" ", "-") for one in found}
 
 
+def test_files_exist(page: Path) -> None:
+    named = set(PATH.findall(page.read_text(encoding="utf-8"))) - WRITTEN_BY_THE_READER
+    missing = {name for name in named if not list(ROOT.glob(name))}
+    assert missing == set()
+
+
+def test_modules_exist(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    named = set(DOTTED.findall(text)) - WRITTEN_BY_THE_READER
+    assert {name for name in named if not exists(name)} == set()
+
+
+def test_imported_names_exist(page: Path) -> None:
+    missing = []
+    for module, names in IMPORT.findall(page.read_text(encoding="utf-8")):
+        for name in names.split(","):
+            if module not in WRITTEN_BY_THE_READER and not exists(f"{module}.{name.strip()}"):
+                missing.append(f"{module}.{name.strip()}")
+    assert missing == []
+
+
+def exists(dotted: str) -> bool:
+    """Whether a dotted name is a module, or an attribute of one."""
+    module, names = dotted, list[str]()
+    while not is_module(module):
+        module, _, name = module.rpartition(".")
+        if not module:
+            return False
+        names.insert(0, name)
+    found: object = importlib.import_module(module)
+    for name in names:
+        if not hasattr(found, name):
+            return False
+        found = getattr(found, name)
+    return True
+
+
+def is_module(name: str) -> bool:
+    try:
+        return importlib.util.find_spec(name) is not None
+    except ModuleNotFoundError:
+        return False
+
+
+def test_pages_name_no_person_for_a_program(page: Path) -> None:
+    assert NOT_FOR_PROGRAMS.findall(page.read_text(encoding="utf-8")) == []
+
+
 def test_parameters_exist(page: Path) -> None:
     text = re.sub(r"\]\([^)]*\)", "]", page.read_text(encoding="utf-8"))  # but for links
     unknown = []
@@ -61,9 +123,8 @@ def test_parameters_exist(page: Path) -> None:
 
 
 def test_verbs_exist(page: Path) -> None:
-    blocks = re.findall(r"```.*?```", page.read_text(encoding="utf-8"), flags=re.DOTALL)
-    verbs = re.findall(r"^airground ([a-z]+)", "\n".join(blocks), re.MULTILINE)
-    assert set(verbs) <= set(VERBS)
+    verbs = re.findall(r"(?:^|`|bin/)airground\s([a-z]+)", page.read_text(encoding="utf-8"), re.M)
+    assert set(verbs) - set(VERBS) == set()
 
 
 def test_the_index_links_every_page() -> None:

@@ -48,7 +48,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (root / room).symlink_to(ROOT / room)
     shutil.copytree(ROOT / "evaluation", root / "evaluation")
     (root / "small.toml").write_text(SCENE, encoding="utf-8")
-    (root / "evaluation/baselines/highest_heap.py").write_text(FUNCTION, encoding="utf-8")
+    (root / "evaluation/measure/baselines/highest_heap.py").write_text(FUNCTION, encoding="utf-8")
     table = root / "evaluation/measure/baselines/table.py"
     table.write_text(with_line(table.read_text(encoding="utf-8")), encoding="utf-8")
     return root
