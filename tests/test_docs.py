@@ -29,9 +29,11 @@ PARAMETER = re.compile(rf"\b({'|'.join(n for n in SECTIONS if n != 'preset')})\.
 def page(request: pytest.FixtureRequest) -> Path:
     return request.param
 
-PATH = re.compile(r"(?<![\w/.-])(?:\.\./)?((?:airground|sim|evaluation|tests|scenes|docs)/[\w/.*-]*\w)")
-DOTTED = re.compile(r"(?<![\w/.-])((?:airground|sim|evaluation)(?:\.\w+)+)")
-IMPORT = re.compile(r"^\s*from ((?:airground|sim|evaluation)[\w.]*) import ([\w, ]+)$", re.MULTILINE)
+
+ROOMS = "airground|sim|evaluation"
+PATH = re.compile(rf"(?<![\w/.-])(?:\.\./)?((?:{ROOMS}|tests|scenes|docs)/[\w/.*-]*\w)")
+DOTTED = re.compile(rf"(?<![\w/.-])((?:{ROOMS})(?:\.\w+)+)")
+IMPORT = re.compile(rf"^\s*from ((?:{ROOMS})[\w.]*) import ([\w, ]+)$", re.MULTILINE)
 WRITTEN_BY_THE_READER = {
     "evaluation/measure/baselines/highest_heap.py",
     "evaluation.measure.baselines.highest_heap",
