@@ -13,7 +13,7 @@ from evaluation.judge.measured import Measured
 from evaluation.judge.results import SUMMARY, read_results
 from evaluation.judge.samples import Flight
 from evaluation.judge.summary import Summary
-from evaluation.judge.verdict import Comparison, Verdict, compare
+from evaluation.judge.verdict import MOVED, Comparison, Verdict, compare
 from evaluation.table.rows import SEQUENCE_KEYS, ResultTable
 
 MOST_RUNS = 4
@@ -107,8 +107,10 @@ class Against:
         counts = [
             f"{len(self.comparison.of(verdict))} {verdict}"
             for verdict in Verdict
-            if verdict not in (Verdict.SAME, Verdict.UNMEASURED) and self.comparison.of(verdict)
+            if verdict in MOVED and self.comparison.of(verdict)
         ]
+        if not counts and not self.comparison.of(Verdict.SAME):
+            return "no verdict possible"
         return ", ".join(counts) or str(Verdict.SAME)
 
 

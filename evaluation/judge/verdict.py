@@ -22,6 +22,7 @@ from evaluation.judge.metrics import WATCHED, Metric
 from evaluation.judge.samples import Samples
 from evaluation.setup.condition import Condition
 from evaluation.table.comparison import (
+    LEAST_OBSERVATIONS,
     Effect,
     adjusted,
     least_paired_p,
@@ -42,7 +43,12 @@ class Verdict(StrEnum):
     SLIGHTLY_BETTER = "slightly better"
     SLIGHTLY_WORSE = "slightly worse"
     SAME = "no difference seen"
+    SINGLE = "one observation: no verdict possible"
     UNMEASURED = "not measured"
+
+
+MOVED = (Verdict.WORSE, Verdict.BETTER, Verdict.SLIGHTLY_WORSE, Verdict.SLIGHTLY_BETTER)
+"""Verdicts of a change beyond chance, in the order in which a reader wants to see them."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +128,7 @@ def compare(before: Measured, after: Measured) -> Comparison:
         if metric.relative:
             matters *= abs(old) if np.isfinite(old) else 0.0
         p = float("nan") if one is None else next(p_values)
-        verdict = Verdict.UNMEASURED if one is None else _verdict(metric, one.effect, p, matters)
+        verdict = Verdict.UNMEASURED if one is None else _verdict(metric, one, p, matters)
         judged.append(Judged(metric, old, new, one, p, matters, verdict))
     return Comparison(before.suite, before.condition, paired, judged)
 
@@ -185,7 +191,7 @@ def _observations(metric: Metric, samples: Samples, by_flight: bool) -> NDArray[
     if by_flight:
         return np.array([flight_value(metric, values) for values in samples.values()])
     # A flight without a value failed as a whole.
-    return np.concatenate([np.array(values or [metric.failure]) for values in samples.values()])
+    return np.array([value for values in samples.values() for value in values or [metric.failure]])
 
 
 def _reaches(least_p: float) -> bool:
@@ -193,7 +199,10 @@ def _reaches(least_p: float) -> bool:
     return least_p * len(WATCHED) <= ALPHA
 
 
-def _verdict(metric: Metric, effect: Effect, p: float, matters: float) -> Verdict:
+def _verdict(metric: Metric, compared: Compared, p: float, matters: float) -> Verdict:
+    effect = compared.effect
+    if compared.count < LEAST_OBSERVATIONS:
+        return Verdict.SINGLE
     if p > ALPHA or effect.value == 0:
         return Verdict.SAME
     improved = (effect.value < 0) == (metric.better == "lower")

@@ -1,13 +1,13 @@
 """What changed between two sets of independent observations: size, interval, and chance.
 
-One observation is one number of one flight (or of one trial, see `evaluation.regression`);
+One observation is one number of one flight (or of one trial, see `evaluation.judge.verdict`);
 a failure may be infinite. Numbers are compared by ranks and their effect is a median, so
 that one failure is one bad observation, however large; shares are compared by their mean.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import comb
 
@@ -19,7 +19,9 @@ PERMUTATIONS = 10_000
 """Tests are exact up to so many rearrangements, and draw as many where there are more."""
 RESAMPLES = 2_000
 SEED = 20_131_103
-"""Of the rearrangements and the bootstrap: the same results give the same verdict."""
+"""Seed of the rearrangements and the bootstrap: the same results give the same verdict."""
+LEAST_OBSERVATIONS = 2
+"""Fewer observations say nothing about chance."""
 
 
 @dataclass(frozen=True)
@@ -40,16 +42,16 @@ class Effect:
 
 NO_EFFECT = Effect(0.0, 0.0, 0.0, 1.0)
 
-Statistic = Callable[[NDArray[np.float64]], NDArray[np.float64]]
-"""(R, N) resamples to (R,) what is told of each."""
-
 
 def paired_effect(differences: NDArray[np.float64], share: bool) -> Effect:
     """The effect seen in N paired differences, after minus before.
 
     Tested by exchanging before and after at random in every pair: Wilcoxon's signed ranks
-    (zeros ranked by Pratt's rule), or the differences themselves for shares.
+    (zeros ranked by Pratt's rule), or the differences themselves for shares. Fewer than
+    `LEAST_OBSERVATIONS` differences have a value at most: no interval and p = 1.
     """
+    if len(differences) < LEAST_OBSERVATIONS:
+        return _untested(float(differences[0]) if len(differences) else 0.0)
     if not differences.any():
         return NO_EFFECT
     scores = differences if share else np.sign(differences) * stats.rankdata(np.abs(differences))
@@ -72,10 +74,17 @@ def two_sample_effect(
     """The effect between two unpaired samples: difference of their medians, or means.
 
     Tested by exchanging observations between the samples: Mann and Whitney's rank sums, or
-    the means for shares.
+    the means for shares. Where a sample has fewer than `LEAST_OBSERVATIONS`, the effect has a
+    value at most: no interval and p = 1.
     """
+    centre = _means if share else _medians
+    if len(before) == 0 or len(after) == 0:
+        return _untested(0.0)
+    value = float(subtract(centre(after[None]), centre(before[None]))[0])
+    if min(len(before), len(after)) < LEAST_OBSERVATIONS:
+        return _untested(value)
     pooled = np.concatenate([before, after])
-    if len(before) == 0 or len(after) == 0 or (pooled == pooled[0]).all():
+    if (pooled == pooled[0]).all():
         return NO_EFFECT
     scores = pooled if share else stats.rankdata(pooled)
     tested = stats.permutation_test(
@@ -86,10 +95,8 @@ def two_sample_effect(
         n_resamples=PERMUTATIONS,
         rng=np.random.default_rng(SEED),
     )
-    centre = _means if share else _medians
     rng = np.random.default_rng(SEED)
     draws = subtract(centre(_resampled(after, rng)), centre(_resampled(before, rng)))
-    value = float(subtract(centre(after[None]), centre(before[None]))[0])
     return _effect(value, draws, min(len(before), len(after)), tested.pvalue)
 
 
@@ -129,6 +136,11 @@ def least_two_sample_p(before: int, after: int) -> float:
     return min(1.0, 2.0 / comb(before + after, before))
 
 
+def _untested(value: float) -> Effect:
+    """An effect of which chance and interval are unknown."""
+    return Effect(value, -np.inf, np.inf, 1.0)
+
+
 def _difference_of_means(
     before: NDArray[np.float64], after: NDArray[np.float64], axis: int
 ) -> NDArray[np.float64]:
@@ -159,8 +171,6 @@ def _effect(value: float, draws: NDArray[np.float64], n: int, p: float) -> Effec
     Resampling N observations spreads sqrt((N - 1) / N) too little, and does not know that
     the spread is itself estimated (Hesterberg, The American Statistician 69(4), 2015).
     """
-    if n < 2:
-        return Effect(value, -np.inf, np.inf, float(p))
     reach = stats.t.ppf(0.975, n - 1) * np.sqrt(n / (n - 1))
     tail = float(stats.norm.cdf(-reach))
     ordered = np.sort(draws)

@@ -7,15 +7,17 @@ from xml.etree import ElementTree
 from evaluation.judge.verdict import Comparison, Judged, Verdict
 from evaluation.show.comparison.verdict_table import HEADER, cells, conclusion, conditions
 
+SKIPPED = (Verdict.SINGLE, Verdict.UNMEASURED)
+
 
 def junit(comparison: Comparison) -> str:
-    """An XML document; what got worse failed, what was not measured was skipped."""
+    """An XML document: a metric that got worse is a failure, one without a verdict is skipped."""
     suite = ElementTree.Element(
         "testsuite",
         name="airground check",
         tests=str(len(comparison.judged)),
         failures=str(len(comparison.of(Verdict.WORSE))),
-        skipped=str(len(comparison.of(Verdict.UNMEASURED))),
+        skipped=str(sum(one.verdict in SKIPPED for one in comparison.judged)),
         errors="0",
     )
     for judged in comparison.judged:
@@ -34,7 +36,7 @@ def _case(judged: Judged) -> ElementTree.Element:
     if judged.verdict == Verdict.WORSE:
         failure = ElementTree.SubElement(case, "failure", message=told, type="worse")
         failure.text = f"{told}; what matters: {judged.metric.why}"
-    elif judged.verdict == Verdict.UNMEASURED:
+    elif judged.verdict in SKIPPED:
         ElementTree.SubElement(case, "skipped", message=told)
     else:
         ElementTree.SubElement(case, "system-out").text = told

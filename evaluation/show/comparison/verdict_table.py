@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from evaluation.judge.metrics import Metric
-from evaluation.judge.verdict import ALPHA, Comparison, Judged, Verdict
+from evaluation.judge.verdict import ALPHA, MOVED, Comparison, Judged, Verdict
 
 MISSING = "-"
 HEADER = ("metric", "accepted", "now", "change", "95 % interval", "p", "compared", "verdict")
@@ -19,10 +19,9 @@ STYLES = {
     Verdict.WORSE: "bold red",
     Verdict.SLIGHTLY_WORSE: "yellow",
     Verdict.BETTER: "bold green",
+    Verdict.SINGLE: "dim",
     Verdict.UNMEASURED: "dim",
 }
-MOVED = (Verdict.WORSE, Verdict.BETTER, Verdict.SLIGHTLY_WORSE, Verdict.SLIGHTLY_BETTER)
-"""In the order in which a reader wants to see them."""
 
 
 def cells(judged: Judged) -> tuple[str, ...]:
@@ -35,8 +34,7 @@ def cells(judged: Judged) -> tuple[str, ...]:
     return (
         *head,
         _change(metric, effect.value),
-        f"{_change(metric, effect.low)} to {_change(metric, effect.high)}",
-        _chance(judged.p),
+        *_certainty(judged),
         _observations(judged),
         str(judged.verdict),
     )
@@ -49,7 +47,13 @@ def conclusion(comparison: Comparison) -> str:
         titles = [judged.metric.title for judged in comparison.of(verdict)]
         if titles:
             parts.append(f"{len(titles)} {verdict}: {'; '.join(titles)}")
-    return ". ".join(parts) if parts else "No difference seen"
+    single = len(comparison.of(Verdict.SINGLE))
+    if single and not parts and not comparison.of(Verdict.SAME):
+        return "One observation of each metric: no verdict possible"
+    parts = parts or ["No difference seen"]
+    if single:
+        parts.append(f"{single} with one observation: no verdict possible")
+    return ". ".join(parts)
 
 
 def conditions(comparison: Comparison) -> str:
@@ -97,7 +101,10 @@ def markdown(comparison: Comparison) -> str:
     if moved:
         lines += [*_markdown_table(moved), ""]
     if rest:
-        lines += ["<details><summary>No difference seen, or not measured</summary>", ""]
+        lines += [
+            "<details><summary>No difference seen, no verdict possible, or not measured</summary>",
+            "",
+        ]
         lines += [*_markdown_table(rest), "", "</details>", ""]
     return "\n".join([*lines, _escaped(conditions(comparison)), ""])
 
@@ -128,6 +135,15 @@ def _observations(judged: Judged) -> str:
     return f"{count} {each}{'s' if count != 1 else ''}{mark}"
 
 
+def _certainty(judged: Judged) -> tuple[str, str]:
+    """The interval of the change and its p; missing where there is one observation."""
+    if judged.compared is None or judged.verdict == Verdict.SINGLE:
+        return MISSING, MISSING
+    metric, effect = judged.metric, judged.compared.effect
+    interval = f"{_change(metric, effect.low)} to {_change(metric, effect.high)}"
+    return interval, "< 0.001" if judged.p < 0.001 else f"{judged.p:.3f}"
+
+
 def _figure(metric: Metric, value: float) -> str:
     if np.isnan(value):
         return MISSING
@@ -151,7 +167,3 @@ def _number(metric: Metric, value: float, sign: str) -> str:
     if metric.unit == "cost":
         return f"{value:{sign}.3f}"
     return f"{100 * value:{sign}.1f} %"
-
-
-def _chance(p: float) -> str:
-    return "< 0.001" if p < 0.001 else f"{p:.3f}"

@@ -71,7 +71,11 @@ def _draw(axes: Axes, panel: Panel, colours: Sequence[str]) -> None:
     for column, (one, colour) in enumerate(zip(panel.runs, colours, strict=True)):
         finite = one.each[np.isfinite(one.each)]
         # Side by side in the order of their size, so that none hides another.
-        places = column + np.linspace(-0.3, 0.08, len(finite)) if len(finite) > 1 else [column]
+        places = (
+            column + np.linspace(-0.3, 0.08, len(finite))
+            if len(finite) > 1
+            else [column] * len(finite)
+        )
         axes.plot(places, np.sort(finite), "o", color=colour, alpha=0.6, markersize=3.5,
                   markeredgewidth=0)  # fmt: skip
         bar = column + 0.25

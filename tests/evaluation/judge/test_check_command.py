@@ -85,6 +85,50 @@ def test_results_can_be_held_against_other_results(accepted: Path, tmp_path: Pat
     assert exit_code("check", before, "--against", results) == 0
 
 
+def one_recording(seed: int, changes: dict[str, float] | None = None) -> ResultTable:
+    """What `run` leaves of one recording: one sequence, one trial, no control scene."""
+    frame = make_results([seed], changes).frame
+    first = (frame["sequence"].fillna(0) == 0) & (frame["trial"].fillna(0) == 0)
+    return ResultTable(frame[(frame["scene"] == "tiny") & first])
+
+
+@pytest.mark.parametrize("other_seed", [0, 1])
+def test_one_observation_gives_both_values_and_no_verdict(
+    other_seed: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = write(one_recording(0), tmp_path / "before")
+    after = write(one_recording(other_seed, {"error_median_m": 3.0}), tmp_path / "after")
+    pull, xml = tmp_path / "check.md", tmp_path / "check.xml"
+    words = ("check", after, "--against", before, "--markdown", pull, "--junit", xml)
+    assert exit_code(*words) == console.EXIT_OK
+    assert "no verdict possible" in capsys.readouterr().out
+    (row,) = [line for line in pull.read_text().splitlines() if "surface, median error" in line]
+    cells = [cell.strip() for cell in row.split("|")[1:-1]]
+    assert cells[1].endswith(" mm")
+    assert cells[2].endswith(" mm")
+    assert cells[1] != cells[2]
+    assert cells[4:6] == ["-", "-"]
+    assert cells[-1] == "one observation: no verdict possible"
+    suite = ElementTree.parse(xml).getroot().find("testsuite")
+    assert suite is not None
+    (case,) = [case for case in suite if case.get("name") == "surface_median"]
+    assert case.find("skipped") is not None
+    assert suite.get("failures") == "0"
+
+
+def test_no_observation_at_all_is_no_verdict(tmp_path: Path) -> None:
+    frame = make_results([0]).frame
+    empty = ResultTable(frame[(frame["stage"] == "run") | (frame["metric"] == "lead")])
+    nothing = write(empty, tmp_path / "nothing")
+    assert exit_code("check", nothing, "--against", nothing) == console.EXIT_OK
+
+
+def test_one_flight_of_many_trials_still_has_a_verdict(tmp_path: Path) -> None:
+    before = write(make_results([0]), tmp_path / "before")
+    after = write(make_results([0], {"error_median_m": 3.0}), tmp_path / "after")
+    assert exit_code("check", after, "--against", before) == console.EXIT_OK
+
+
 def test_what_cannot_be_compared_is_one_line(
     accepted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

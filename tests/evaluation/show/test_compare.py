@@ -162,6 +162,23 @@ def test_the_command_writes_a_page_that_needs_nothing_else(
     assert (tmp_path / "out" / "figures" / "paired_differences.pdf").is_file()
 
 
+@pytest.mark.parametrize("failed", [False, True])
+def test_two_runs_of_one_recording_make_a_page(
+    failed: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    frame = make_results([0]).frame
+    first = (frame["sequence"].fillna(0) == 0) & (frame["trial"].fillna(0) == 0)
+    single = frame[(frame["scene"] == "tiny") & first]
+    changed = single.copy()
+    changed.loc[changed["metric"] == "error_median_m", "value"] *= float("nan") if failed else 3.0
+    old = written(tmp_path / "old", ResultTable(single))
+    new = written(tmp_path / "new", ResultTable(changed))
+    assert exit_code("compare", old, new, "--out", tmp_path / "out") == console.EXIT_OK
+    assert "no verdict possible" in capsys.readouterr().out
+    html = (tmp_path / "out" / PAGE).read_text(encoding="utf-8")
+    assert "one observation: no verdict possible" in html
+
+
 @pytest.mark.parametrize(
     ("others", "said"),
     [
