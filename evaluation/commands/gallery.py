@@ -12,7 +12,7 @@ from airground.errors import InputError
 from evaluation.commands.words import OutWord, Verb
 
 if TYPE_CHECKING:
-    from evaluation.measure.showcase.showcase import Showcase
+    from evaluation.measure.showcase import Showcase
 
 
 @dataclass(frozen=True, kw_only=True)

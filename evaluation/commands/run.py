@@ -63,7 +63,7 @@ class Run(Verb, OwnWords, AloneWords, RealtimeWords, LookWords, SetupWords, Seed
         from airground.io.layout import HEADER
         from airground.io.recording import Recording
         from evaluation.judge.results import Results
-        from evaluation.measure.showcase.close_up import CloseUp
+        from evaluation.measure.close_up import CloseUp
         from evaluation.run.recording import write_run
         from evaluation.setup.output import fresh_folder
         from evaluation.show.report.page import write_results
@@ -88,7 +88,9 @@ class Run(Verb, OwnWords, AloneWords, RealtimeWords, LookWords, SetupWords, Seed
                 result, drops = self._result(recording, truth, setup, seed, onlookers)
             write_run(folder, recording, result)
             drops.write(folder / DROPPED)
-            showcase = None if closeup is None else closeup.showcase(result)
+            showcase = (
+                None if closeup is None else closeup.showcase(result.tracked, result.augmented)
+            )
             summary = write_results(Results(result.table, setup.config, seed, showcase), folder)
         print_summary(summary)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from airground.config import Config
 from airground.errors import InputError
 from evaluation.judge.summary import Summary
-from evaluation.measure.showcase.showcase import Showcase
+from evaluation.measure.showcase import Showcase
 from evaluation.setup.settings import resolve
 from evaluation.table.rows import ResultTable
 

@@ -10,7 +10,7 @@ from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
 from airground.core.surface import AerialSurface, DepthMap
 from airground.core.trajectory import Trajectory
-from evaluation.measure.showcase.showcase import LocalizationStep, Showcase
+from evaluation.measure.showcase import LocalizationStep, Showcase
 from evaluation.setup.condition import Condition
 from evaluation.setup.published import TABLE_I
 from evaluation.table.row_writer import RowWriter
@@ -194,8 +194,6 @@ def make_showcase(seed: int = 0, scale: int = 1) -> Showcase:
         surface_error=surface_error,
         aerial_heights=aerial_heights,
         ground_heights=ground_heights,
-        aerial_reference=np.zeros(2),
-        aerial_heading=0.0,
         steps=steps,
         ground_cloud=_ground_cloud(rng, 40000 // scale**2),
         aerial_cloud=aerial,

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from evaluation.measure.protocol.trials import Protocol
-from evaluation.measure.showcase.showcase import Showcase
+from evaluation.measure.showcase import Showcase
 from evaluation.measure.work.crew import Crew
 from evaluation.measure.work.measure import measure
 from evaluation.measure.work.recordings import recorded, recording_name

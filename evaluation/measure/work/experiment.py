@@ -12,6 +12,7 @@ import numpy as np
 
 from airground.io.recording import Recording
 from evaluation.measure.baselines.measure import add_baselines
+from evaluation.measure.close_up import make_showcase
 from evaluation.measure.protocol.error_budget import add_error_budget
 from evaluation.measure.protocol.mapping_pass import GroundPass, Maps, map_ground, map_recording
 from evaluation.measure.protocol.negatives import add_negatives
@@ -23,8 +24,7 @@ from evaluation.measure.protocol.trials import (
     trial_sightings,
 )
 from evaluation.measure.protocol.wide_search import add_wide_searches
-from evaluation.measure.showcase.maker import make_showcase
-from evaluation.measure.showcase.showcase import Showcase
+from evaluation.measure.showcase import Showcase
 from evaluation.run.onlooker import STAGE_OF
 from evaluation.setup.memory import peak_memory_mib
 from evaluation.setup.setups import Setup

@@ -15,7 +15,7 @@ from airground.errors import InputError
 from airground.io import layout
 from airground.io.digests import bytes_digest, file_digest
 from evaluation.measure.protocol.trials import Protocol
-from evaluation.measure.showcase.showcase import Showcase
+from evaluation.measure.showcase import Showcase
 from evaluation.measure.work.code_version import code_version
 from evaluation.measure.work.experiment import Task
 from evaluation.setup.setups import Setup

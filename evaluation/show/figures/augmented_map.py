@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from airground.core.se3 import SE3
-from evaluation.measure.showcase.showcase import Showcase
+from evaluation.measure.showcase import Showcase
 from evaluation.show.figures.scene_pictures import GROUND_COLOUR, GROUND_PATH, MAV_COLOUR, MAV_PATH
 from evaluation.show.figures.style import INK, WIDE_IN, picture_axes, styled
 

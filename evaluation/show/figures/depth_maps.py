@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from evaluation.measure.showcase.showcase import Showcase
+from evaluation.measure.showcase import Showcase
 from evaluation.show.figures.boxes import TITLE_PAD_PT, draw_box, log_axis
 from evaluation.show.figures.style import (
     DEPTH_COLOURS,

@@ -12,7 +12,7 @@ from matplotlib.image import AxesImage
 from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import binary_closing, binary_fill_holes
 
-from evaluation.measure.showcase.showcase import Showcase
+from evaluation.measure.showcase import Showcase
 from evaluation.show.figures.style import (
     COST_COLOURS,
     HEIGHT_COLOURS,
@@ -132,8 +132,6 @@ def _footprint(axes: Axes, showcase: Showcase, u: NDArray) -> None:
     seen = np.pad(np.isfinite(aerial.heights), 2)
     seen = binary_fill_holes(binary_closing(seen, iterations=2))
     index = np.stack(np.meshgrid(*(np.arange(n) - 2 for n in seen.shape), indexing="ij"), axis=-1)
-    points = aerial.origin + index / aerial.cells_per_m - showcase.aerial_reference
-    c, s = np.cos(showcase.aerial_heading), np.sin(showcase.aerial_heading)
-    x = u[0] + c * points[..., 0] - s * points[..., 1]
-    y = u[1] + s * points[..., 0] + c * points[..., 1]
+    points = aerial.origin + index / aerial.cells_per_m
+    x, y = u[0] + points[..., 0], u[1] + points[..., 1]
     axes.contour(x, y, seen.astype(float), levels=[0.5], colors=[PAPER], linewidths=1.2)

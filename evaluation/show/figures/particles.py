@@ -9,7 +9,7 @@ from matplotlib.patches import Ellipse
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from evaluation.measure.showcase.showcase import LocalizationStep
+from evaluation.measure.showcase import LocalizationStep
 from evaluation.show.figures.height_maps import draw_costs, mark_truth
 from evaluation.show.figures.style import WIDE_IN, styled
 

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
-from evaluation.measure.showcase.showcase import Showcase
+from evaluation.measure.showcase import Showcase
 
 if TYPE_CHECKING:
     import pyrender

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from matplotlib.figure import Figure
 
 from evaluation.measure.baselines.matched_images import MatchedImages
-from evaluation.measure.showcase.showcase import Showcase
+from evaluation.measure.showcase import Showcase
 from evaluation.show.figures.augmented_map import augmented_figure, refinement_figure
 from evaluation.show.figures.depth_maps import depth_maps_figure
 from evaluation.show.figures.height_maps import height_maps_figure

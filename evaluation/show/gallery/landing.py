@@ -17,7 +17,7 @@ from PIL import Image
 
 from airground.core.se3 import SE3, interpolate
 from airground.pipeline import moved
-from evaluation.measure.showcase.showcase import Showcase
+from evaluation.measure.showcase import Showcase
 from evaluation.show.figures.scene_pictures import Viewpoint, render_augmented_map
 
 WIDTH_PX = 720

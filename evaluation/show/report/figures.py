@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from evaluation.measure.showcase.showcase import Showcase
+from evaluation.measure.showcase import Showcase
 from evaluation.setup import published
 from evaluation.setup.condition import Condition, shared_parts, short_labels
 from evaluation.show.figures.localization_error import localization_error_figure, spread_figure

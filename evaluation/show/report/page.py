@@ -13,7 +13,7 @@ from PIL import Image
 
 from evaluation.judge.results import CONFIG, SHOWCASE, SUMMARY, TABLE, Results
 from evaluation.judge.summary import Summary, build_summary
-from evaluation.measure.showcase.showcase import Showcase
+from evaluation.measure.showcase import Showcase
 from evaluation.setup import published
 from evaluation.setup.condition import Condition, shared_parts
 from evaluation.setup.run_info import RunInfo

@@ -13,13 +13,15 @@ from PIL import Image
 
 from airground.augmentation import AugmentedMap
 from airground.config import Config
+from airground.core.belief import Alignment
 from airground.core.cloud import Source
-from airground.core.events import CostMapComputed
+from airground.core.events import Aligned, CostMapComputed
+from airground.core.se3 import SE3
 from airground.io.recording import Recording
 from evaluation import cli
-from evaluation.measure.showcase.close_up import CloseUp
-from evaluation.measure.showcase.showcase import Showcase
-from evaluation.run.recording import RunResult
+from evaluation.measure import close_up as module
+from evaluation.measure.close_up import CloseUp
+from evaluation.measure.showcase import Showcase
 from evaluation.setup.setups import EXACT, Setup
 from evaluation.show.figures.style import save_picture
 from evaluation.show.gallery.figures import showcase_figures
@@ -39,17 +41,13 @@ RECORDING = cast(
 SOURCES = np.array([Source.GROUND, Source.MAV, Source.MAV], np.uint8)
 
 
-def result() -> RunResult:
+def result() -> tuple[dict[str, Tracked], AugmentedMap]:
     frames = {"mav": run.mav_frame(2 * run.SECOND), "ground": run.ground_frame(run.SECOND)}
     tracked = {
         robot: Tracked(robot, FrontEndLog(AnswerLog([frame.pose])), None, slam=True)
         for robot, frame in frames.items()
     }
-    augmented = AugmentedMap(run.CLOUD, SOURCES)
-    return cast(
-        RunResult,
-        SimpleNamespace(tracked=tracked, augmented=augmented, T_ground_mav=run.T_GROUND_MAV),
-    )
+    return tracked, AugmentedMap(run.CLOUD, SOURCES)
 
 
 def close_up() -> CloseUp:
@@ -60,7 +58,7 @@ def close_up() -> CloseUp:
 def kept() -> Showcase:
     watcher = close_up()
     show(watcher, seen_events())
-    showcase = watcher.showcase(result())
+    showcase = watcher.showcase(*result())
     assert showcase is not None
     return showcase
 
@@ -83,7 +81,7 @@ def test_later_maps_are_not_kept() -> None:
     watcher = close_up()
     for _ in range(5):
         show(watcher, seen_events())
-    showcase = watcher.showcase(result())
+    showcase = watcher.showcase(*result())
     assert showcase is not None
     assert len(showcase.steps) == 3
     assert len(showcase.depth_maps) == 1
@@ -95,15 +93,52 @@ def test_costs_that_the_filter_did_without_are_computed_for_the_picture() -> Non
     heights = [seen for seen in events if type(seen.event).__name__ == "HeightMapsMade"]
     show(watcher, [replace(seen) for seen in events])
     assert heights
-    showcase = watcher.showcase(result())
+    showcase = watcher.showcase(*result())
     assert showcase is not None
     assert np.isfinite(showcase.steps[0].cost_map.costs).any()
+
+
+def test_a_first_surface_that_was_not_aligned_is_refined_for_the_picture(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    refined = next(seen for seen in seen_events() if isinstance(seen.event, Aligned)).event
+    assert isinstance(refined, Aligned)
+    starts = []
+
+    def refine(stamp_ns: int, start: SE3, *_: object) -> Alignment:
+        starts.append(start)
+        return refined.alignment
+
+    monkeypatch.setattr(module, "refine", refine)
+    watcher = close_up()
+    show(watcher, [seen for seen in seen_events() if not isinstance(seen.event, Aligned)])
+    showcase = watcher.showcase(*result())
+    assert showcase is not None
+    assert showcase.T_ground_mav is run.T_GROUND_MAV
+    assert starts == [run.BELIEF.T_ground_mav]
+
+
+def test_a_refused_alignment_is_not_kept() -> None:
+    watcher = close_up()
+    show(watcher, seen_events(accepted=False))
+    showcase = watcher.showcase(*result())
+    assert showcase is not None
+    assert showcase.T_ground_mav is None
+
+
+def test_depth_maps_of_surfaces_before_the_first_located_one_are_left_out() -> None:
+    watcher = close_up()
+    show(watcher, seen_events()[:8])  # up to the surface: a robot was lost
+    show(watcher, seen_events()[5:])
+    showcase = watcher.showcase(*result())
+    assert showcase is not None
+    assert len(showcase.depth_maps) == run.SURFACE.depth_maps == 1
 
 
 def test_a_run_that_located_nothing_keeps_nothing() -> None:
     watcher = close_up()
     show(watcher, seen_events()[:5])
-    assert watcher.showcase(result()) is None
+    assert watcher.showcase(*result()) is None
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
 from airground.errors import InputError
 from evaluation.measure.baselines.matched_images import MatchedImages
-from evaluation.measure.showcase.showcase import Showcase
+from evaluation.measure.showcase import Showcase
 from evaluation.show.figures.scene_pictures import (
     BACKGROUND,
     Viewpoint,
@@ -69,6 +69,15 @@ def test_a_damaged_file_is_named(showcase: Showcase, tmp_path: Path, name: str) 
     showcase.save(tmp_path)
     (tmp_path / name).write_bytes(b"rubbish")
     with pytest.raises(InputError, match=name):
+        Showcase.load(tmp_path)
+
+
+def test_a_missing_entry_is_named(showcase: Showcase, tmp_path: Path) -> None:
+    showcase.save(tmp_path)
+    with np.load(tmp_path / "showcase.npz") as stored:
+        entries = {name: stored[name] for name in stored.files if name != "surface.camera.fx"}
+    np.savez(tmp_path / "showcase.npz", **entries)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"entry 'surface\.camera\.fx' is missing"):
         Showcase.load(tmp_path)
 
 

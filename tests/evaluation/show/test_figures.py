@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
-from evaluation.measure.showcase.showcase import Showcase
+from evaluation.measure.showcase import Showcase
 from evaluation.show.figures.augmented_map import refinement_figure
 from evaluation.show.figures.boxes import draw_box, log_axis
 from evaluation.show.figures.depth_maps import completeness, depth_maps_figure

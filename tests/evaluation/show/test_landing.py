@@ -12,7 +12,7 @@ from airground.core.se3 import SE3
 from airground.pipeline import moved
 from evaluation import cli
 from evaluation.judge.results import Results
-from evaluation.measure.showcase.showcase import Showcase
+from evaluation.measure.showcase import Showcase
 from evaluation.show.figures.scene_pictures import render_augmented_map
 from evaluation.show.gallery import landing as module
 from evaluation.show.gallery.landing import END_MS, MAP_PX, PAUSE_MS, landing, save_landing

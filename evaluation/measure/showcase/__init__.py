@@ -1,1 +1,0 @@
-"""One flight looked at closely: the data that pictures are drawn from."""
