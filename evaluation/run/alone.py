@@ -19,7 +19,10 @@ from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.io.robot_recording import RobotRecording
 from airground.io.tum import write_tum
-from airground.slam.front_end import FrontEnd, TrackedPose, Tracking
+from airground.slam.front_end import FrontEnd, TrackedPose
+from evaluation.setup.checked_json import number
+from evaluation.setup.text import percent, seconds
+from evaluation.table.tracked_share import tracked_share_of
 from evaluation.table.trajectory_error import trajectory_error
 
 
@@ -40,19 +43,6 @@ class AloneResult:
     final: Trajectory | None
     frame_ms: NDArray[np.float64]
     finish_ms: float
-
-    @property
-    def tracked_fraction(self) -> float:
-        """Share of the images that got a pose."""
-        return sum(pose.tracking is Tracking.TRACKED for pose in self.tracked) / len(self.tracked)
-
-    @property
-    def lost_images(self) -> int:
-        """Images without a pose after the first that had one."""
-        states = [pose.tracking for pose in self.tracked]
-        if Tracking.TRACKED not in states:
-            return 0
-        return sum(s is not Tracking.TRACKED for s in states[states.index(Tracking.TRACKED) :])
 
 
 def run_alone(recording: RobotRecording, front_end: FrontEnd[Any]) -> AloneResult:
@@ -92,6 +82,7 @@ def write_alone(
     for name, path in (("trajectory", result.final), ("trajectory_live", result.live)):
         if path is not None:
             write_tum(folder / f"{name}.tum", of_pose_frame(path, recording.T_pose_camera))
+    share = tracked_share_of(recording, result.tracked, true_pose)
     summary = {
         "schema": "airground-alone",
         "version": 1,
@@ -101,8 +92,9 @@ def write_alone(
         "pose_frame": recording.pose_frame,
         "recorded_s": recording.duration_s,
         "images": len(result.tracked),
-        "tracked_fraction": result.tracked_fraction,
-        "lost_images": result.lost_images,
+        "tracked_fraction": share.fraction,
+        "first_pose_s": number(share.first_pose_s),
+        "lost_images": share.lost_images,
         "frame_ms": {
             "mean": float(result.frame_ms.mean()),
             "median": float(np.median(result.frame_ms)),
@@ -131,7 +123,8 @@ def print_alone(summary: dict[str, Any], console: Console | None = None) -> None
     shown.add_column("here", justify="right", style="bold")
     times = summary["frame_ms"]
     shown.add_row("images", str(summary["images"]))
-    shown.add_row("tracked", f"{100 * summary['tracked_fraction']:.1f} %")
+    shown.add_row("tracked, from the first motion on", percent(summary["tracked_fraction"]))
+    shown.add_row("first pose after", seconds(summary["first_pose_s"]))
     shown.add_row("lost after the first pose", str(summary["lost_images"]))
     shown.add_row(
         "time a frame: mean, 95th percentile", f"{times['mean']:.1f}, {times['p95']:.1f} ms"

@@ -30,7 +30,10 @@ from evaluation.run.given_map import enter
 from evaluation.run.onlooker import Audience, Onlooker, timed
 from evaluation.run.recording import pipeline_rng
 from evaluation.run.tracking import front_end_rng
+from evaluation.setup.checked_json import number
 from evaluation.setup.setups import Setup
+from evaluation.setup.text import percent, seconds
+from evaluation.table.tracked_share import tracked_share_of
 from evaluation.table.tracking_log import Tracked, WatchedFrontEnd
 from evaluation.table.true_camera import true_camera
 
@@ -156,7 +159,8 @@ def print_pair(summary: dict[str, Any], console: Console | None = None) -> None:
     shown.add_row("located after", str(summary["located"]))
     shown.add_row("alignments accepted", f"{summary['accepted']} of {summary['alignments']}")
     for name, robot in summary["robots"].items():
-        shown.add_row(f"{name}: tracked", f"{100 * robot['tracked_fraction']:.1f} %")
+        shown.add_row(f"{name}: tracked", percent(robot["tracked_fraction"]))
+        shown.add_row(f"{name}: first pose after", seconds(robot["first_pose_s"]))
         error = robot["error"]["final"]
         rms = "truth unknown" if error is None else f"{100 * error['ate_se3_rmse_m']:.2f} cm"
         shown.add_row(f"{name}: RMS after SE3", rms)
@@ -200,12 +204,14 @@ def _robot(folder: Path, pair: Pair, robot: Source, tracked: Tracked) -> dict[st
         if path is not None:
             write_tum(folder / f"{file}.tum", of_pose_frame(path, recording.T_pose_camera))
     answers = tracked.front_end.answers
+    share = tracked_share_of(recording, answers, true_pose)
     return {
         "layout": recording.layout,
         "pose_frame": recording.pose_frame,
         "recorded_s": recording.duration_s,
         "images": len(answers),
-        "tracked_fraction": len(live_poses) / len(answers),
+        "tracked_fraction": share.fraction,
+        "first_pose_s": number(share.first_pose_s),
         "frame_ms_median": float(np.median(tracked.front_end.durations_ms)),
         "error": {
             "final": error_against(true_pose, tracked.final),

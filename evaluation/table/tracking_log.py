@@ -132,13 +132,6 @@ class FrontEndLog:
         """Stamp and pose of each tracked image, as they were said at its time."""
         return [(a.stamp_ns, a.T_map_camera) for a in self.answers if a.T_map_camera is not None]
 
-    def since_tracking(self) -> list[TrackedPose]:
-        """The answers from the first tracked image on; none where there is no such image."""
-        for first, answer in enumerate(self.answers):
-            if answer.tracking is Tracking.TRACKED:
-                return self.answers[first:]
-        return []
-
 
 class WatchedFrontEnd(FrontEndLog, Generic[Image]):
     """Passes everything on, and keeps the answers and their times.

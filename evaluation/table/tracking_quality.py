@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.se3 import SE3
-from airground.slam.front_end import Tracking
 from evaluation.table.consistency import consistency
 from evaluation.table.row_writer import RowWriter
+from evaluation.table.tracked_share import first_motion_ns, tracked_share
 from evaluation.table.tracking_log import FrontEndLog, Tracked
 from evaluation.table.trajectory_error import aligned_errors, trajectory_error
 
@@ -37,7 +37,7 @@ def add_tracking(out: RowWriter, tracked: Tracked, true_pose: Callable[[int], SE
             out.add(STAGE, f"{robot}_path_m", error.path_m, "m")
         for time_s, value in _over_time(front_end, poses, true_pose):
             out.add(ERROR_STAGE, f"{robot}_{prefix}error_m", value, "m", time_s=time_s)
-    _add_gaps(out, robot, front_end)
+    _add_share(out, robot, front_end, true_pose)
     _add_consistency(out, robot, front_end, true_pose)
     if tracked.slam:
         for duration in front_end.durations_ms:
@@ -64,17 +64,15 @@ def _spaced(stamps_ns: NDArray[np.int64]) -> list[int]:
     return stamps_ns[first].tolist()
 
 
-def _add_gaps(out: RowWriter, robot: str, front_end: FrontEndLog) -> None:
-    """How long it took to begin, and how much was tracked from then on."""
-    since = front_end.since_tracking()
-    if not since:
-        out.add(STAGE, f"{robot}_tracked_fraction", 0.0, "")
-        out.add(STAGE, f"{robot}_initialized_s", float("nan"), "s", note="never tracked")
-        return
-    share = np.mean([answer.tracking is Tracking.TRACKED for answer in since])
-    out.add(STAGE, f"{robot}_tracked_fraction", float(share), "")
-    waited_ns = since[0].stamp_ns - front_end.answers[0].stamp_ns
-    out.add(STAGE, f"{robot}_initialized_s", waited_ns * 1e-9, "s")
+def _add_share(
+    out: RowWriter, robot: str, front_end: FrontEndLog, true_pose: Callable[[int], SE3]
+) -> None:
+    stamps = np.array([answer.stamp_ns for answer in front_end.answers], np.int64)
+    motion_ns = first_motion_ns(stamps, true_pose) if len(stamps) else 0
+    share = tracked_share(front_end.answers, motion_ns)
+    out.add(STAGE, f"{robot}_tracked_fraction", share.fraction, "")
+    note = "never tracked" if np.isnan(share.first_pose_s) else ""
+    out.add(STAGE, f"{robot}_initialized_s", share.first_pose_s, "s", note=note)
 
 
 def _add_consistency(

@@ -26,6 +26,7 @@ from airground.slam import front_ends
 from airground.slam.front_end import FrontEnd
 from evaluation.run.alone import run_alone
 from evaluation.show.figures.style import PICTURE_DPI, SERIES, WIDE_IN, styled
+from evaluation.table.tracked_share import tracked_share_of
 from evaluation.table.trajectory_error import aligned_errors
 from evaluation.table.true_camera import true_camera
 
@@ -38,7 +39,7 @@ class FrontEndError:
         name: As on the command line.
         time_s: (N,) of its poses since the first image [s].
         error_m: (N,) of their positions after SE3 alignment [m].
-        tracked: Share of the images that got a pose.
+        tracked: Share of the images with a pose (`tracked_share`).
     """
 
     name: str
@@ -87,7 +88,8 @@ def front_end_error(recording: RobotRecording, name: str, config: Config) -> Fro
     truth = {stamp: true for stamp, _, true in poses}
     errors = aligned_errors([(stamp, pose) for stamp, pose, _ in poses], truth.__getitem__)
     time_s = (np.array(list(truth)) - recording.camera_stamps[0]) * 1e-9
-    return FrontEndError(name, time_s, errors, result.tracked_fraction)
+    share = tracked_share_of(recording, result.tracked, true_pose)
+    return FrontEndError(name, time_s, errors, share.fraction)
 
 
 def _known(

@@ -56,7 +56,7 @@ def test_regular_truth_is_known_throughout(folder: Path, rate_hz: float, jitter_
 
 def test_steps_that_rounding_made_longer_than_50_ms_are_bridged(folder: Path) -> None:
     truth = START_NS + np.arange(80, dtype=np.int64) * 50_000_128
-    assert known(folder, truth, stamps(30)).all()
+    assert known(folder, truth, stamps(30)[:-3]).all()
     assert known(folder, truth, truth).all()
 
 

@@ -1,0 +1,109 @@
+"""Numbers and tables as text: on the screen, in the report and on other pages."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+MISSING = "-"
+"""What was not measured."""
+FAILED = "failed"
+"""A quantile that failures reach: they count as infinitely large errors."""
+FINE_M = 0.1
+"""Lengths below this are given in millimetres [m]."""
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """Cells as text; the first column names the row.
+
+    Attributes:
+        header: One text per column.
+        rows: Tuples as long as the header; what follows a line break in a cell is detail.
+    """
+
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+
+def formatted(value: float | None, form: str, infinite: str = FAILED) -> str:
+    """A value by a format such as "{:.2f} s"; words where it is missing or infinite."""
+    if value is None or math.isnan(value):
+        return MISSING
+    return infinite if math.isinf(value) else form.format(value)
+
+
+def metres(value: float | None) -> str:
+    """Millimetres below `FINE_M`, metres above."""
+    if value is not None and abs(value) < FINE_M:
+        return f"{1e3 * value:.1f} mm"
+    return formatted(value, "{:.2f} m")
+
+
+def degrees(value: float | None) -> str:
+    return formatted(value, "{:.2f}°")
+
+
+def percent(value: float | None, decimals: int = 1) -> str:
+    """A share of 1 in percent."""
+    return formatted(None if value is None else 100 * value, f"{{:.{decimals}f}} %")
+
+
+def seconds(value: float | None) -> str:
+    """Seconds until something happened."""
+    return formatted(value, "{:.1f} s", infinite="never")
+
+
+def milliseconds(value: float | None) -> str:
+    """Three digits or so, without the unit."""
+    if value is None or not math.isfinite(value):
+        return MISSING
+    return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:.2f}"
+
+
+def print_table(
+    table: TextTable,
+    title: str = "",
+    caption: str = "",
+    *,
+    console: Console | None = None,
+    left: Sequence[int] = (0,),
+    bold: Sequence[int] = (),
+    styles: Sequence[str] = (),
+    compact: bool = False,
+) -> None:
+    """Print a table with its title above and a caption below.
+
+    Args:
+        table: Cells.
+        title, caption: Text; empty for none.
+        console: Where to print; standard output by default.
+        left: Indices of the columns that align left.
+        bold: Indices of the columns in bold.
+        styles: One rich style per row; empty for none.
+        compact: A line under the header only, for wide tables.
+    """
+    shown = Table(
+        title=Text(title) if title else None,
+        caption=Text(caption) if caption else None,
+        title_justify="left",
+        caption_justify="left",
+        box=box.SIMPLE_HEAD if compact else box.HEAVY_HEAD,
+        padding=(0, 1, 0, 0) if compact else (0, 1),
+    )
+    for index, heading in enumerate(table.header):
+        shown.add_column(
+            Text(heading),
+            justify="left" if index in left else "right",
+            style="bold" if index in bold else "",
+            overflow="fold",
+        )
+    for index, row in enumerate(table.rows):
+        shown.add_row(*map(Text, row), style=styles[index] if styles else "")
+    (console or Console()).print(shown)
