@@ -1,4 +1,4 @@
-"""How the stages' times grow: one size is varied at a time, all others stay."""
+"""How the stages' times grow: one size is varied at a time, all others are fixed."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from airground.core.cloud import PointCloud
 from airground.dense.view_selection import PosedImage
 from airground.dense.volume import resized
 from evaluation.bench.dense_rows import Sweep, VoxelWork, sweep_of
-from evaluation.bench.localization_rows import Maps, paper_sized, particles
-from evaluation.bench.map_rows import refinement
+from evaluation.bench.localization_rows import Maps, paper_sized, particles, refinement
 from evaluation.bench.material import Material
-from evaluation.bench.row import Work
+from evaluation.bench.work import Work
 
 
 @dataclass(frozen=True)
@@ -25,11 +24,11 @@ class Curve:
     """One size that is varied.
 
     Attributes:
-        name: For JSON.
-        title: What is timed.
-        parameter: What is varied, with its unit; as a user would set it.
-        values: Its values.
-        make: The work at one of them.
+        name: Name in JSON.
+        title: Name of the stage that is timed.
+        parameter: The varied parameter with its unit, as a user sets it.
+        values: Values of the parameter.
+        make: Makes the work at one value.
     """
 
     name: str
@@ -47,12 +46,12 @@ class CurvePoint(NamedTuple):
 
 
 def exponent(values: ArrayLike, times_ms: ArrayLike) -> float:
-    """p of the power law time = a value^p that fits best on logarithmic axes."""
+    """Exponent p of the law time = a value^p, fitted on logarithmic axes."""
     return float(np.polyfit(np.log(np.asarray(values)), np.log(np.asarray(times_ms)), 1)[0])
 
 
 def _image_width(material: Material, width_px: float) -> Work:
-    """A frame added, from images made smaller."""
+    """Add a frame, from smaller images."""
     sweep = sweep_of(material, material.config)
     height_px = round(width_px * sweep.camera.height / sweep.camera.width)
     size = round(width_px), height_px
@@ -84,15 +83,14 @@ def _voxels(material: Material, millions: float) -> Work:
 
 
 def _search_area(material: Material, area_m2: float) -> Work:
-    config = paper_sized(search_radius_m=float(np.sqrt(area_m2)) / 2)
-    return Work(Maps(material, config, material.heading).search)
+    return Work(Maps(material, paper_sized(search_radius_m=float(np.sqrt(area_m2)) / 2)).search)
 
 
 def _cells_per_m(material: Material, cells_per_m: float) -> Work:
     config = paper_sized()
     height_maps = config.height_maps.model_copy(update={"cells_per_m": cells_per_m})
     config = config.model_copy(update={"height_maps": height_maps})
-    return Work(Maps(material, config, material.heading).search)
+    return Work(Maps(material, config).search)
 
 
 def _particles(material: Material, count: float) -> Work:
@@ -104,7 +102,7 @@ def _map_size(material: Material, copies: float) -> Work:
 
 
 def tiled(cloud: PointCloud, copies: int) -> PointCloud:
-    """A map so many times as large: the same one, laid beside itself along x."""
+    """A larger map: copies of one beside each other along x."""
     points = cloud.points
     step = np.array([np.ptp(points[:, 0]) + 1.0, 0.0, 0.0], np.float32)
     return PointCloud(
@@ -122,13 +120,7 @@ CURVES = (
         _image_width,
     ),
     Curve("hypotheses", "Add a frame", "depth hypotheses", (25, 50, 100, 200, 400), _hypotheses),
-    Curve(
-        "voxels",
-        "A fused surface",
-        "voxels [millions]",
-        (1.7, 3.4, 6.8, 13.5, 27),
-        _voxels,
-    ),
+    Curve("voxels", "A fused surface", "voxels [millions]", (1.7, 3.4, 6.8, 13.5, 27), _voxels),
     Curve("search_area", "Full cost map", "searched area [m²]", (5, 10, 20, 40, 80), _search_area),
     Curve(
         "cells_per_m", "Full cost map", "cells per metre", (12.5, 17.5, 25, 35, 50), _cells_per_m

@@ -1,8 +1,10 @@
-"""Section V's stages as work: on the views, depth maps and voxels of one surface."""
+"""Work on images and distance fields: Section V, the ground map and decoding."""
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,9 +23,14 @@ from airground.dense.view_selection import AFTER, BEFORE, PosedImage
 from airground.dense.volume import Volume
 from airground.dense.workspace import Workspace
 from airground.errors import InputError
+from airground.ground_map import GroundMap
+from airground.ground_map.surface_points import surface_points
 from evaluation.bench import floors
 from evaluation.bench.material import Material
-from evaluation.bench.row import Work
+from evaluation.bench.work import Work
+
+DECODED = 60
+"""Images read in turn: some tens of MB, which the system keeps in memory."""
 
 
 @dataclass
@@ -31,9 +38,9 @@ class Sweep:
     """One depth map under construction, view after view as the pipeline adds them.
 
     Attributes:
-        camera: Of the images.
-        reference: The view that the depth map is of.
-        views: Those that are compared with it.
+        camera: Intrinsics of the images.
+        reference: View of the depth map.
+        views: Views that are compared with it, in order of time.
         config: The pipeline's parameters.
     """
 
@@ -50,7 +57,7 @@ class Sweep:
         before = [view for view in self.views if view.stamp_ns < self.reference.stamp_ns]
         extent = scene_extent(self.reference, before or self.views, self.camera)
         if extent is None:
-            raise InputError("the views show too little texture to tell the depth of the scene")
+            raise InputError("the views show too little texture for the depth of the scene")
         self._planes = inverse_depth_planes(
             extent.near_m, extent.far_m, self.config.plane_sweep.hypotheses
         )
@@ -61,7 +68,7 @@ class Sweep:
 
     @property
     def pixels(self) -> int:
-        """Of the depth map: half of the image's a side."""
+        """Pixels of the depth map, which has half of the image's width and height."""
         return (self.camera.width // 2) * (self.camera.height // 2)
 
     @property
@@ -72,7 +79,7 @@ class Sweep:
         )
 
     def ready(self) -> None:
-        """Begin anew when all views are in."""
+        """Begin a new depth map when all views are in."""
         if self._sweep is None or self._added == len(self.views):
             if self._sweep is not None:
                 self._sweep.release()
@@ -138,7 +145,7 @@ class VoxelWork:
     """The volume of one surface and what is computed in it, with memory kept between calls.
 
     Attributes:
-        depth_maps: That are fused.
+        depth_maps: Depth maps that are fused.
         config: The pipeline's parameters.
     """
 
@@ -169,12 +176,12 @@ class VoxelWork:
         return " x ".join(map(str, self.config.fusion.voxels)) + " voxels"
 
     def volume(self) -> Volume:
-        """What all depth maps saw."""
+        """The volume that all depth maps saw."""
         fusion = self.config.fusion
         return Volume.around(self.depth_maps, self.reference, fusion.voxels, fusion.truncation_m)
 
     def empty(self, volume: Volume | None = None) -> None:
-        """A new histogram in the old one's memory, over the same volume where none is given."""
+        """A new histogram in the old one's memory, over the same volume if None."""
         fusion, old = self.config.fusion, self.histogram
         self.histogram = FieldHistogram(
             volume or old.volume, fusion.truncation_m, fusion.bins, old.counts
@@ -240,10 +247,49 @@ def ray_cast(material: Material) -> Work:
 
 
 def surface(material: Material) -> Work:
-    """Fields, fusion and casting of one surface: what other libraries do in one go."""
+    """Fields, fusion and casting of one surface, which other libraries do in one step."""
     work = VoxelWork(material.depth_maps, material.config)
     parameters, count = work.config.fusion, len(work.depth_maps)
     floor = floors.distance_field(work.voxels) * count
     floor += floors.fusion(work.voxels, parameters.iterations, parameters.bins)
     floor += floors.ray_cast(work.voxels, work.pixels)
     return Work(work.all_of_it, size=f"{work.size}, {count} depth maps", floor=floor)
+
+
+def ground_map(material: Material) -> Work:
+    """One keyframe: packed, and fused into the distance field."""
+    image, pose = material.ground_image, material.sighting.T_ground_camera
+    built = GroundMap(material.ground_camera, material.config.ground_mapping)
+    height, width = image.depth.shape
+    return Work(lambda: built.add(image, pose), size=f"{width} x {height} px")
+
+
+def ground_surface(material: Material) -> Work:
+    """The ground map's points, colours and normals from its distance field."""
+    field = material.ground_field
+    least = material.config.ground_mapping.min_keyframes - 0.5
+    points = len(surface_points(field, least))
+    return Work(
+        lambda: surface_points(field, least),
+        size=f"{len(field.rows)} blocks, {points} points",
+        floor=floors.ground_surface(field.tsdf.size, points),
+    )
+
+
+def read_grey(material: Material) -> Work:
+    recording = material.recording
+    camera = material.mav_camera
+    read = _in_turn(recording.read_mav_image, len(recording.mav_camera_stamps))
+    return Work(read, size=f"{camera.width} x {camera.height} px, grey PNG")
+
+
+def read_colour_depth(material: Material) -> Work:
+    recording = material.recording
+    camera = material.ground_camera
+    read = _in_turn(recording.read_ground_image, len(recording.ground_camera_stamps))
+    return Work(read, size=f"{camera.width} x {camera.height} px, colour and depth PNG")
+
+
+def _in_turn(read: Callable[[int], object], count: int) -> Callable[[], object]:
+    indices = itertools.cycle(range(0, count, max(1, count // DECODED)))
+    return lambda: read(next(indices))

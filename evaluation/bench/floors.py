@@ -1,25 +1,76 @@
-"""The least that each row must move and compute: a mark that no program passes.
+"""The floor of each row: the least data to move and arithmetic to do, whatever the program.
 
 Counted are data that fit no cache (cost volumes, voxels), once in and once out of every pass
-that the method cannot do without, and the arithmetic of the method's inner loop. What a
-cache can hold, indices, conversions and comparisons are left out, so that the floor is lower
-than what can be reached, never higher.
+that the method needs, and the arithmetic of the method's inner loop. Cached data, indices,
+conversions and comparisons are left out: the floor may be too low, never too high.
 """
 
 from __future__ import annotations
 
 import math
 
-from evaluation.bench.row import Floor
+from pydantic import ConfigDict
+from pydantic.dataclasses import dataclass
+
+from evaluation.setup.checked_json import Amount
 
 FLOAT, COST, COUNTS, POINT = 4, 2, 4, 12
 """Bytes of a float32, of a uint16 cost, of a voxel's packed histogram, of a point."""
+
+STRICT = ConfigDict(extra="forbid")
+
+
+@dataclass(frozen=True, config=STRICT)
+class Speed:
+    """The most that a number of cores can do, as probed.
+
+    Attributes:
+        threads: Number of cores.
+        bandwidth_gb_s: To and from memory.
+        arithmetic_gflop_s: float32 additions and multiplications.
+    """
+
+    threads: int
+    bandwidth_gb_s: Amount
+    arithmetic_gflop_s: Amount
+
+    def at_least(self, other: Speed) -> Speed:
+        """The higher of both, figure by figure, for the same number of cores."""
+        return Speed(
+            self.threads,
+            max(self.bandwidth_gb_s, other.bandwidth_gb_s),
+            max(self.arithmetic_gflop_s, other.arithmetic_gflop_s),
+        )
+
+
+@dataclass(frozen=True, config=STRICT)
+class Floor:
+    """What any program must do for one call of a row.
+
+    Attributes:
+        bytes_moved: To and from memory, of data that fit no cache.
+        operations: float32 additions and multiplications.
+    """
+
+    bytes_moved: Amount
+    operations: Amount
+
+    def __add__(self, other: Floor) -> Floor:
+        return Floor(self.bytes_moved + other.bytes_moved, self.operations + other.operations)
+
+    def __mul__(self, count: float) -> Floor:
+        return Floor(count * self.bytes_moved, count * self.operations)
+
+    def least_ms(self, speed: Speed) -> float:
+        """Its time where memory and arithmetic overlap perfectly [ms]."""
+        memory = self.bytes_moved / speed.bandwidth_gb_s
+        return 1e-6 * max(memory, self.operations / speed.arithmetic_gflop_s)
 
 
 def add_frame(pixels: int, planes: int) -> Floor:
     """One view against all planes (Sec. V).
 
-    The view has two columns for one of the reference: two interpolations across rows and one
+    The view has two columns for each of the reference: two interpolations across rows and one
     along the row make a sample; then difference and sum.
     """
     return Floor(2 * COST * pixels * planes, (3 * 3 + 2) * pixels * planes)
@@ -28,7 +79,7 @@ def add_frame(pixels: int, planes: int) -> Floor:
 def depth_map(pixels: int, planes: int, sides: int, semiglobal: bool) -> Floor:
     """Window means over the sides, smoothing along four directions, and the minimum.
 
-    Running sums take four operations a side whatever the window. Smoothing needs a pass along
+    Running sums take four operations per side, whatever the window. Smoothing needs a pass along
     rows and one along columns: each reads the means, and reads and writes the sums.
     """
     samples = pixels * planes
@@ -39,7 +90,7 @@ def depth_map(pixels: int, planes: int, sides: int, semiglobal: bool) -> Floor:
 
 
 def distance_field(voxels: int) -> Floor:
-    """One depth map into the histogram: a projection, a difference and a vote a voxel."""
+    """One depth map into the histogram: a projection, a difference and a vote per voxel."""
     return Floor(2 * COUNTS * voxels, 14 * voxels)
 
 
@@ -48,14 +99,14 @@ def fusion(voxels: int, iterations: int, bins: int) -> Floor:
 
     phi, its extrapolation and three dual fields are read and written, and the counts read, once:
     rows can take any number of steps while they are in the cache. The prox takes a product,
-    two sums, a minimum and a maximum a bin.
+    two sums, a minimum and a maximum per bin.
     """
     operations = 17 + 8 + 5 * bins
     return Floor((10 * FLOAT + COUNTS) * voxels, operations * iterations * voxels)
 
 
 def ray_cast(voxels: int, pixels: int) -> Floor:
-    """Every voxel's sign once, and a crossing with its normal a pixel."""
+    """The sign of every voxel once; a crossing with its normal per pixel."""
     return Floor(FLOAT * voxels + (FLOAT + POINT) * pixels, 2 * voxels + 40 * pixels)
 
 
@@ -71,13 +122,13 @@ def cost_map(cells: int) -> Floor:
     of the differences; six complex products.
 
     Args:
-        cells: Of the searched square, widened by the aerial map.
+        cells: Cells of the searched square, widened by the aerial map.
     """
     return transforms(cells, 9) + Floor(0, 6 * 6 * cells / 2)
 
 
 def heading_search(cells: int, headings: int) -> Floor:
-    """The same for many headings; the ground's three transforms are shared."""
+    """The cost map for many headings; the ground's three transforms are shared."""
     return transforms(cells, 3) + (transforms(cells, 6) + Floor(0, 18 * cells)) * headings
 
 
@@ -86,8 +137,8 @@ def particles(cells: int, count: int, turned: bool) -> Floor:
 
     Args:
         cells: Filled cells of the aerial map.
-        count: Particles.
-        turned: Each has a heading: then every cell has its own place and weights.
+        count: Number of particles.
+        turned: Whether each has a heading, so that every cell has its own place and weights.
     """
     each = (7 + 7 + 1) + 10 + (8 + 6 if turned else 0)
     return Floor(0, each * cells * count)
@@ -99,7 +150,7 @@ def height_map(points: int, cells: int) -> Floor:
 
 
 def ground_surface(voxels: int, points: int) -> Floor:
-    """Distance and weight of every voxel once, three comparisons; a point and its normal each."""
+    """Distance and weight of every voxel once, three comparisons; each point and its normal."""
     colours = 3
     return Floor(2 * FLOAT * voxels + (2 * POINT + colours) * points, 3 * voxels + 40 * points)
 

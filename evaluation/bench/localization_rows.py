@@ -1,28 +1,37 @@
-"""Section VI's stages as work: on the height maps of one surface and of the ground map."""
+"""Work of Sections VI and VII: one aerial surface located in the ground map, and refined."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from airground.augmentation import Augmentation
 from airground.config import Config, paper
 from airground.core.belief import HeightMap
-from airground.localization.cost_map import overlay_at, overlay_turned, reach_of
-from airground.localization.height_map import aerial_height_map, ground_height_map
+from airground.core.cloud import PointCloud
+from airground.core.se3 import SE3
+from airground.localization.cost_map import reach_of
+from airground.localization.height_map_pair import HeightMapPair
 from airground.localization.hypotheses import CostVolume, search_headings, search_positions
 from airground.localization.particles import resample, weights
+from airground.pipeline import moved, pair_of
+from airground.refinement import refine
 from evaluation.bench import floors
 from evaluation.bench.material import Material
-from evaluation.bench.row import Floor, Work
+from evaluation.bench.work import Work
+from evaluation.setup.published import START_NOISE_DEG, START_NOISE_M
+from evaluation.setup.setups import with_localization
 
 PAPER_SEARCH_M = (4.0, 5.0)
-"""What the paper timed; the product searches squares, so one of the same area is timed here."""
-CLOUD_OF_PARTICLES_M = 0.3
-"""Standard deviation of the particles' places about the right one [m]."""
+"""The region that the paper timed; a square of the same area is timed here."""
+CLOUD_OF_PARTICLES_M, CLOUD_OF_PARTICLES_RAD = 0.3, 0.1
+"""Standard deviation of the particles about the right place and heading: a belief that has
+nearly converged."""
+SLANTED = np.ones(3) / np.sqrt(3.0)
+"""The start of refinement is shifted and turned along this axis: all six directions count."""
 
 
 @dataclass
@@ -30,147 +39,169 @@ class Maps:
     """Both height maps of one surface.
 
     Attributes:
-        material: Whose clouds they are of.
+        material: The surface and the ground map.
         config: Resolution, cost, and search region.
-        heading: That the aerial map is turned by [rad].
     """
 
     material: Material
     config: Config
-    heading: float
-    aerial: HeightMap = field(init=False)
-    ground: HeightMap = field(init=False)
+    pair: HeightMapPair = field(init=False)
 
     def __post_init__(self) -> None:
-        self.aerial, self.ground = self.make()
+        self.pair = self.make()
 
-    def make(self) -> tuple[HeightMap, HeightMap]:
-        """The aerial map about its camera, and the ground map as far as one could lie on it."""
-        surface, config = self.material.surface, self.config
-        position = np.array(surface.T_mav_camera.translation)
-        aerial = aerial_height_map(
-            surface.cloud_mav.points, position, self.heading, config.height_maps
-        )
-        reach_m = float(np.linalg.norm(reach_of(aerial), axis=1).max() + 2) / aerial.cells_per_m
-        ground = ground_height_map(
-            self.material.ground_cloud.points,
-            self.material.robot_position,
-            config.localization.search_radius_m + reach_m,
-            config.height_maps,
-        )
-        return aerial, ground
+    def make(self) -> HeightMapPair:
+        """The aerial map about its camera, and the ground map as far as the search reaches."""
+        sighting = replace(self.material.sighting, heading=self.material.heading)
+        pair = pair_of(sighting, self.config)
+        _ = pair.ground  # computes both
+        return pair
 
     @property
-    def offsets(self) -> int:
-        """Searched a side."""
-        side = 2 * self.config.localization.search_radius_m * self.aerial.cells_per_m
-        return math.floor(side + 1e-6) + 1
+    def aerial(self) -> HeightMap:
+        return self.pair.aerial
+
+    @property
+    def ground(self) -> HeightMap:
+        return self.pair.ground
 
     @property
     def size(self) -> str:
-        nx, ny = self.aerial.heights.shape
+        (nx, ny), offsets = self.aerial.heights.shape, self._offsets
         return (
-            f"{self.offsets} x {self.offsets} offsets at {self.aerial.cells_per_m:g} cells/m, "
+            f"{offsets} x {offsets} offsets at {self.aerial.cells_per_m:g} cells/m, "
             f"aerial map of {nx} x {ny} cells"
         )
 
-    def searched_cells(self, reach: tuple[int, ...]) -> int:
-        """Of the searched square, widened by an aerial map of that many cells."""
-        return math.prod(self.offsets + n - 1 for n in reach)
+    @property
+    def _offsets(self) -> int:
+        """Offsets searched along one side."""
+        side = 2 * self.config.localization.search_radius_m * self.aerial.cells_per_m
+        return math.floor(side + 1e-6) + 1
 
-    def floor(self) -> Floor:
-        """Of the cost map."""
-        return floors.cost_map(self.searched_cells(self.aerial.heights.shape))
+    def searched_cells(self, reach: tuple[int, ...]) -> int:
+        """Cells of the searched square, widened by an aerial map of this shape."""
+        return math.prod(self._offsets + n - 1 for n in reach)
 
     def search(self) -> CostVolume:
-        """The cost of every position."""
-        return search_positions(
-            self.aerial,
-            self.ground,
-            self.material.robot_position,
-            self.heading,
-            self.config.localization,
-        )
+        """The cost of every position, and of every heading where it is searched."""
+        robot, config = self.material.robot_position, self.config.localization
+        if self.pair.searched:
+            return search_headings(self.aerial, self.ground, robot, config)
+        return search_positions(self.aerial, self.ground, robot, self.pair.turn, config)
 
     def poses(self, count: int) -> NDArray[np.float64]:
-        """(count, 3) particles about the right place."""
+        """(count, 3) particles about the right place: x, y [m] and heading [rad]."""
         rng = np.random.default_rng(0)
         surface = self.material.surface
         place = (self.material.T_ground_mav @ surface.T_mav_camera.translation)[:2]
         poses = np.empty((count, 3))
         poses[:, :2] = rng.normal(place, CLOUD_OF_PARTICLES_M, (count, 2))
-        poses[:, 2] = rng.normal(self.material.heading, 0.1, count)
+        poses[:, 2] = rng.normal(self.material.heading, CLOUD_OF_PARTICLES_RAD, count)
         return poses
 
 
 def paper_sized(**localization: object) -> Config:
     """The published constants, with the searched area that the paper timed."""
-    config = paper()
-    update = {"search_radius_m": math.sqrt(math.prod(PAPER_SEARCH_M)) / 2, **localization}
-    return config.model_copy(update={"localization": config.localization.model_copy(update=update)})
-
-
-def cost_map(material: Material) -> Work:
-    maps = Maps(material, paper_sized(), material.heading)
-    return Work(maps.search, size=f"{maps.size}, ZMSSD", floor=maps.floor())
-
-
-def cost_map_correlation(material: Material) -> Work:
-    maps = Maps(material, paper_sized(cost="ncc"), material.heading)
-    return Work(maps.search, size=f"{maps.size}, correlation", floor=maps.floor())
-
-
-def heading_search(material: Material) -> Work:
-    maps = Maps(material, paper_sized(heading="search"), 0.0)
-    config = maps.config.localization
-
-    def search() -> object:
-        return search_headings(maps.aerial, maps.ground, material.robot_position, config)
-
-    volume = search_headings(maps.aerial, maps.ground, material.robot_position, config)
-    # Turned, the aerial map reaches as far as its farthest cell, on all sides.
-    reach = 2 * math.ceil(np.linalg.norm(reach_of(maps.aerial), axis=1).max()) + 1
-    cells = maps.searched_cells((reach, reach))
-    size = f"{config.headings} headings ({len(volume.headings)} looked at), {maps.size}"
-    return Work(search, size=size, floor=floors.heading_search(cells, len(volume.headings)))
-
-
-def particles(material: Material, count: int | None = None) -> Work:
-    """Weigh the particles by Eq. 5 and draw them anew, heading known."""
-    maps = Maps(material, paper_sized(), material.heading)
-    config = maps.config.localization
-    poses, rng = maps.poses(count or config.particles), np.random.default_rng(0)
-
-    def update() -> object:
-        costs = overlay_at(maps.aerial, maps.ground, poses[:, :2]).costs(config)
-        return poses[resample(weights(costs, config.sigma), rng)]
-
-    return _particle_work(maps, update, len(poses), turned=False)
-
-
-def particles_heading(material: Material) -> Work:
-    """The same where each particle has a heading."""
-    maps = Maps(material, paper_sized(heading="search"), 0.0)
-    config = maps.config.localization
-    poses, rng = maps.poses(config.particles), np.random.default_rng(0)
-
-    def update() -> object:
-        costs = overlay_turned(maps.aerial, maps.ground, poses).costs(config)
-        return poses[resample(weights(costs, config.sigma), rng)]
-
-    return _particle_work(maps, update, len(poses), turned=True)
-
-
-def _particle_work(maps: Maps, update: Callable[[], object], count: int, turned: bool) -> Work:
-    cells = maps.aerial.filled_cells
-    size = f"{count} particles, {cells} filled cells at {maps.aerial.cells_per_m:g} cells/m"
-    return Work(update, size=size, floor=floors.particles(cells, count, turned))
+    radius_m = math.sqrt(math.prod(PAPER_SEARCH_M)) / 2
+    return with_localization(paper(), **{"search_radius_m": radius_m, **localization})
 
 
 def height_maps(material: Material) -> Work:
     """Both maps, as `best` makes them for each surface."""
-    maps = Maps(material, material.config, material.heading)
+    maps = Maps(material, material.config)
     points = len(material.surface.cloud_mav), len(material.ground_cloud)
     cells = maps.aerial.heights.size + maps.ground.heights.size
     size = f"{points[0]} and {points[1]} points, {maps.aerial.cells_per_m:g} cells/m"
     return Work(maps.make, size=size, floor=floors.height_map(sum(points), cells))
+
+
+def cost_map(material: Material) -> Work:
+    return _cost_map(Maps(material, paper_sized()), "ZMSSD")
+
+
+def cost_map_correlation(material: Material) -> Work:
+    return _cost_map(Maps(material, paper_sized(cost="ncc")), "correlation")
+
+
+def _cost_map(maps: Maps, cost: str) -> Work:
+    floor = floors.cost_map(maps.searched_cells(maps.aerial.heights.shape))
+    return Work(maps.search, size=f"{maps.size}, {cost}", floor=floor)
+
+
+def heading_search(material: Material) -> Work:
+    maps = Maps(material, paper_sized(heading="search"))
+    searched = len(maps.search().headings)
+    # Turned, the aerial map reaches as far as its farthest cell, on all sides.
+    reach = 2 * math.ceil(np.linalg.norm(reach_of(maps.aerial), axis=1).max()) + 1
+    floor = floors.heading_search(maps.searched_cells((reach, reach)), searched)
+    size = f"{maps.config.localization.headings} headings ({searched} looked at), {maps.size}"
+    return Work(maps.search, size=size, floor=floor)
+
+
+def particles(material: Material, count: int | None = None) -> Work:
+    """Weigh the particles by Eq. 5 and draw them anew, heading known."""
+    return _particles(Maps(material, paper_sized()), count)
+
+
+def particles_heading(material: Material) -> Work:
+    """The same where each particle has a heading."""
+    return _particles(Maps(material, paper_sized(heading="search")))
+
+
+def _particles(maps: Maps, count: int | None = None) -> Work:
+    config = maps.config.localization
+    poses, rng = maps.poses(count or config.particles), np.random.default_rng(0)
+
+    def update() -> object:
+        costs = maps.pair.overlay(poses).costs(config)
+        return poses[resample(weights(costs, config.sigma), rng)]
+
+    cells = maps.aerial.filled_cells
+    size = f"{len(poses)} particles, {cells} filled cells at {maps.aerial.cells_per_m:g} cells/m"
+    floor = floors.particles(cells, len(poses), maps.pair.searched)
+    return Work(update, size=size, floor=floor)
+
+
+def start_of(material: Material) -> SE3:
+    """The start of refinement: the paper's 0.2 m and 3 degrees off, about the cloud's middle."""
+    right = material.T_ground_mav
+    centre = right @ material.surface.cloud_mav.points.mean(axis=0, dtype=np.float64)
+    turn = SE3.from_rotation_vector(np.deg2rad(START_NOISE_DEG.value) * SLANTED)
+    shift = START_NOISE_M.value * SLANTED + centre - turn @ centre
+    return SE3(turn.rotation, shift) @ right
+
+
+def _refinement(material: Material, config: Config, ground: PointCloud) -> Work:
+    surface, start = material.surface, start_of(material)
+    size = f"{len(surface.cloud_mav)} on {len(ground)} points"
+    return Work(
+        lambda: refine(surface.stamp_ns, start, surface.cloud_mav, ground, config), size=size
+    )
+
+
+def icp(material: Material) -> Work:
+    """As published: with its preparation, without the search for a better start."""
+    return _refinement(material, paper(), material.ground_cloud)
+
+
+def refinement(material: Material, ground: PointCloud | None = None) -> Work:
+    """As `best` does it: the height maps give a start, then ICP.
+
+    Args:
+        material: The surface.
+        ground: The ground map; that of the material where None.
+    """
+    return _refinement(material, material.config, ground or material.ground_cloud)
+
+
+def augmentation(material: Material) -> Work:
+    surface, motion = material.surface, material.T_ground_mav
+    voxels = Augmentation(material.config.ground_mapping.voxel_m)
+
+    def augment() -> object:
+        voxels.add(surface, motion)
+        return moved(surface.cloud_mav, motion)
+
+    points = len(surface.cloud_mav)
+    return Work(augment, size=f"{points} points", floor=floors.added_points(points))

@@ -1,11 +1,12 @@
-"""What the rows work on: one aerial surface of a recording, and all that it came from.
+"""The input of the rows: one aerial surface of a recording, and all that it came from.
 
-The whole pipeline runs over the recording, SLAM included and without any truth. This is
-timed, and what the stages handed each other on the way is kept for one surface.
+The whole pipeline runs over the recording, SLAM included, without truth. This is timed, and
+what the stages pass to each other is kept for one surface.
 """
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -35,35 +36,35 @@ from airground.ground_map import GroundMap
 from airground.ground_map.blocked_field import BlockedField
 from airground.io.recording import Recording
 from airground.pipeline import Pipeline, Sighting, sight
+from evaluation.bench.report import RealTime
 from evaluation.run.drops import nothing_dropped
 from evaluation.run.recording import pipeline_rng
 from evaluation.run.tracking import TrackingTask
 from evaluation.run.tracking_process import TrackingApart
-from evaluation.setup.memory import resident_mib
+from evaluation.setup.memory import AddedMemory, resident_mib
 from evaluation.setup.setups import Setup
 
 PARTS = 10
-"""Memory is looked at so many times over a recording."""
-
+"""Parts of a recording after which the memory is read."""
 ALIGNED_SURFACES = 3
-"""The surface that is kept is this one of those that were aligned: by then there is a map."""
+"""The third aligned surface is kept: by then the ground map covers more than its start."""
 
 
 @dataclass(frozen=True, eq=False)
 class Material:
-    """One aerial surface and what the stages had at hand for it.
+    """One aerial surface and the input of every stage for it.
 
     Attributes:
-        recording: Where it comes from.
+        recording: The recording that it comes from.
         config: The parameters that it was made with.
-        mav_camera, ground_camera: Of the images.
-        depth_maps: That were fused.
-        reference: The view of the middle depth map ...
-        views: ... and those that were compared with it, in order of time.
-        sighting: The surface, and the ground robot's map by then.
-        T_ground_mav: As it was aligned.
-        ground_image: The ground robot's newest image by then.
-        ground_field: The distance field that its map's points came from.
+        mav_camera, ground_camera: Intrinsics of the images.
+        depth_maps: The depth maps that were fused.
+        reference: The view of the middle depth map.
+        views: The views that were compared with the reference, in order of time.
+        sighting: The surface, and the ground robot's map at its time.
+        T_ground_mav: The aligned pose.
+        ground_image: The ground robot's newest image at that time.
+        ground_field: The distance field of the ground map's points.
     """
 
     recording: Recording
@@ -84,7 +85,7 @@ class Material:
 
     @property
     def reference_depth(self) -> DepthMap:
-        """The depth map whose view the volume stands before."""
+        """The depth map whose view spans the volume."""
         return self.depth_maps[len(self.depth_maps) // 2]
 
     @property
@@ -93,7 +94,7 @@ class Material:
 
     @property
     def robot_position(self) -> NDArray[np.float64]:
-        """(2,) the ground robot in `ground` [m]."""
+        """(2,) position of the ground robot in `ground` [m]."""
         return self.sighting.T_ground_camera.translation[:2]
 
     @property
@@ -104,67 +105,73 @@ class Material:
 
 @dataclass(frozen=True)
 class Played:
-    """How long the whole pipeline took over the recording.
+    """Times of the whole pipeline over the recording.
 
     Attributes:
         frame_ms: By robot ("mav", "ground"): processor time of each image, with the inertial
             samples before it.
-        recorded_s: How much was played.
-        processing_s: By the clock, decoding included.
-        cpu_s: Of mapping and tracking.
-        resident_mib: What all processes held after each of ten parts; none if nobody counts it.
-        tracking_memory_mib: The most that tracking ever held.
+        pipeline: Times and memory of the whole run.
     """
 
     frame_ms: dict[str, list[float]]
-    recorded_s: float
-    processing_s: float
-    cpu_s: float
-    resident_mib: list[float]
-    tracking_memory_mib: float
+    pipeline: RealTime
 
 
-def play(recording: Recording, config: Config, whole: bool) -> tuple[Material, Played | None]:
-    """Run the pipeline with SLAM over a recording, as `run` does, and keep what the rows need.
+def play(
+    recording: Recording, config: Config, threads: int, whole: bool
+) -> tuple[Material, Played | None]:
+    """Run the pipeline with SLAM over a recording, as `run` does, and keep the rows' material.
 
     Args:
-        recording: Of both robots.
+        recording: A recording of both robots.
         config: The pipeline's parameters.
-        whole: To its end; else only until the material is there, and nothing is told of how
-            long it took.
+        threads: Number of this process's cores, for the report.
+        whole: Play it to its end; else stop once there is material, and report no times.
 
     Raises:
-        InputError: No aerial surface could be aligned, so that there is nothing to work on.
+        InputError: No aerial surface could be aligned: there is no material.
     """
-    task = TrackingTask(recording, None, Setup(config), 0, nothing_dropped(recording))
-    pipeline = Pipeline(config, recording.mav, recording.ground, pipeline_rng(0))
-    gathering = _Gathering(recording, config, pipeline)
-    with TrackingApart(task) as tracking:
-        memory = MemoryLog(recording, tracking.pids)
-        tracking.wait_until_ready()
-        started, cpu = time.perf_counter(), time.process_time()
-        for event in pipeline.run(tracking.frames()):
-            gathering.take(event)
-            memory.take(event)
-            if gathering.complete and not whole:
-                return gathering.material(), None
-        report = tracking.report()
-        processing_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu
-    return gathering.material(), Played(
-        {robot: one.front_end.durations_ms for robot, one in report.tracked.items()},
-        recording.duration_s,
-        processing_s,
-        cpu_s + report.processor_s,
-        memory.resident_mib,
-        report.peak_memory_mib,
+    with AddedMemory() as added:
+        task = TrackingTask(recording, None, Setup(config), 0, nothing_dropped(recording))
+        pipeline = Pipeline(config, recording.mav, recording.ground, pipeline_rng(0))
+        gathering = _Gathering(recording, config, pipeline)
+        with TrackingApart(task) as tracking:
+            memory = MemoryLog(recording, tracking.pids)
+            tracking.wait_until_ready()
+            started, cpu = time.perf_counter(), time.process_time()
+            for event in pipeline.run(tracking.frames()):
+                gathering.take(event)
+                memory.take(event)
+                if gathering.complete and not whole:
+                    return gathering.material(), None
+            report = tracking.report()
+            processing_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu
+    frame_ms = {name: tracked.front_end.durations_ms for name, tracked in report.tracked.items()}
+    real_time = RealTime(
+        threads=threads,
+        recorded_s=recording.duration_s,
+        processing_s=processing_s,
+        cpu_s=cpu_s + report.processor_s,
+        real_time_factor=recording.duration_s / processing_s,
+        peak_memory_mib=None if added.mib is None else added.mib + report.peak_memory_mib,
+        resident_mib=tuple(memory.resident_mib),
     )
+    return gathering.material(), Played(frame_ms, real_time)
 
 
 class MemoryLog:
-    """Listens to the pipeline, and looks at the memory after each part of the recording."""
+    """Consumes the pipeline's events; reads the memory held after each part of the recording.
 
-    def __init__(self, recording: Recording, tracking: Sequence[int | str]) -> None:
-        self._processes = ("self", *tracking)
+    Args:
+        recording: The recording that is played.
+        tracking: Numbers of the tracking processes.
+
+    Attributes:
+        resident_mib: Memory of all processes after each part [MiB]; empty if not counted.
+    """
+
+    def __init__(self, recording: Recording, tracking: Sequence[int]) -> None:
+        self._processes = (os.getpid(), *tracking)
         stamps_ns = recording.stamps_ns(Source.GROUND)
         first_ns, last_ns = int(stamps_ns[0]), int(stamps_ns[-1])
         ends_ns = np.linspace(first_ns, last_ns, PARTS + 1)[1:]
@@ -175,13 +182,13 @@ class MemoryLog:
         ground = isinstance(event, GroundTracked)
         while ground and self._waiting_ns and event.stamp_ns >= self._waiting_ns[0]:
             self._waiting_ns.pop(0)
-            now_mib = resident_mib(*self._processes)
+            now_mib = resident_mib(self._processes)
             self.resident_mib += [] if now_mib is None else [now_mib]
 
 
 @dataclass
 class _Gathering:
-    """Listens to the pipeline."""
+    """Consumes the pipeline's events, and keeps the material of one surface."""
 
     recording: Recording
     config: Config
@@ -202,7 +209,7 @@ class _Gathering:
         if self.kept is None:
             raise InputError(
                 f"{self.recording.path}: no aerial surface could be aligned with the ground map, "
-                "so that there is nothing to time; give another --recording"
+                "so there is nothing to time; give another --recording"
             )
         return self.kept
 

@@ -1,10 +1,13 @@
-"""What a user would take from another library instead, on the same data.
+"""The same work by other libraries, on the same data.
 
-Each peer is used as its documentation shows, with every core it takes by itself. Where it does
-less or more than the row, `rows.py` says so beside it.
+Each peer is used as its documentation shows, with every core that it takes by itself. The table
+at the end says where it does less or more than ours.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -19,20 +22,38 @@ from airground.dense.scene_extent import scene_extent
 from airground.dense.volume import Volume
 from airground.ground_map.blocked_field import ATTRIBUTES, BLOCK, empty_grid
 from evaluation.bench.dense_rows import with_paper_planes
-from evaluation.bench.localization_rows import Maps, paper_sized
-from evaluation.bench.map_rows import start_of
+from evaluation.bench.localization_rows import Maps, paper_sized, start_of
 from evaluation.bench.material import Material
-from evaluation.bench.row import Work
+from evaluation.bench.work import Work
 
 FIRST_BLOCKS = 20_000
+"""Blocks that Open3D's grids have room for at first: enough for one surface."""
 NEIGHBOURS = 10
+"""Points that a normal is estimated from, as in ours."""
+
+
+@dataclass(frozen=True)
+class Peer:
+    """The work of a row by another library.
+
+    Attributes:
+        name: Name for readers.
+        package: Module that it imports.
+        differs: How its work differs from ours.
+        make: Makes its work from the material.
+    """
+
+    name: str
+    package: str
+    differs: str
+    make: Callable[[Material], Work]
 
 
 def masked_correlation(material: Material) -> Work:
     """scikit-image: normalized correlation of masked images (Padfield 2012), and its peak."""
     from skimage.registration import phase_cross_correlation
 
-    maps = Maps(material, paper_sized(), material.heading)
+    maps = Maps(material, paper_sized())
     ground, ground_mask = _filled(maps.ground.heights)
     aerial, aerial_mask = _filled(maps.aerial.heights)
 
@@ -50,7 +71,7 @@ def masked_correlation(material: Material) -> Work:
 
 def match_template(material: Material) -> Work:
     """OpenCV: the aerial map, masked, as a template on the ground map."""
-    maps = Maps(material, paper_sized(), material.heading)
+    maps = Maps(material, paper_sized())
     ground, _ = _filled(maps.ground.heights)
     aerial, mask = _filled(maps.aerial.heights)
     weight = mask.astype(np.float32)
@@ -58,7 +79,7 @@ def match_template(material: Material) -> Work:
 
 
 def _filled(heights: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
-    """Heights with their mean in holes, and where there are some."""
+    """Heights with their mean in holes, and which cells are no holes."""
     known = np.isfinite(heights)
     return np.where(known, heights, heights[known].mean()).astype(np.float32), known
 
@@ -153,7 +174,7 @@ class _Grid:
 
 
 def fuse_keyframe(material: Material) -> Work:
-    """Open3D: an image of the ground robot into a field of hashed blocks, with its colours."""
+    """Open3D: a colour and depth image into a distance field of hashed blocks."""
     image, config = material.ground_image, material.config.ground_mapping
     grid = empty_grid(config.voxel_m, FIRST_BLOCKS)
     T_camera_ground = material.sighting.T_ground_camera.inverse()
@@ -216,3 +237,65 @@ def open3d_icp(material: Material) -> Work:
 def _cloud(cloud: PointCloud) -> o3d.geometry.PointCloud:
     points = o3d.utility.Vector3dVector(cloud.points.astype(np.float64))
     return o3d.geometry.PointCloud(points)
+
+
+PEERS = {
+    "ground_map": (
+        Peer(
+            "Open3D",
+            "open3d",
+            "half a pixel off, beside jumps in depth too; no image is kept to fuse anew",
+            fuse_keyframe,
+        ),
+    ),
+    "ground_surface": (
+        Peer(
+            "Open3D",
+            "open3d",
+            "in no lasting order, and without a surface that lies on voxels exactly",
+            extract_ground,
+        ),
+    ),
+    "add_frame": (
+        Peer(
+            "OpenCV, plane by plane",
+            "cv2",
+            "samples the view halved, so blurred; no gain, no record of what is covered",
+            plane_by_plane,
+        ),
+    ),
+    "distance_field": (
+        Peer(
+            "Open3D TSDF",
+            "open3d",
+            "a running mean near the surface only, no histogram",
+            integrate_one,
+        ),
+    ),
+    "surface": (
+        Peer(
+            "Open3D TSDF",
+            "open3d",
+            "a running mean, no regularization; every crossing, not only what the view sees",
+            integrate_and_extract,
+        ),
+    ),
+    "cost_map": (
+        Peer(
+            "scikit-image, masked",
+            "skimage",
+            "correlation instead of Eq. 2, over every offset with overlap, and its peak",
+            masked_correlation,
+        ),
+        Peer(
+            "OpenCV, matchTemplate",
+            "cv2",
+            "correlation instead of Eq. 2; the ground map's holes count as its mean",
+            match_template,
+        ),
+    ),
+    "icp": (
+        Peer("Open3D ICP", "open3d", "no trimming, and one distance for all steps", open3d_icp),
+    ),
+}
+"""By the name of the row."""

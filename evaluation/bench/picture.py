@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,17 +16,15 @@ from evaluation.show.figures.style import FAINT, INK, PAPER, SERIES, SMALL_PT, W
 HERE, PEER = SERIES[0], SERIES[1]
 BAR = 0.56
 COLUMNS = 4
-"""Curves beside each other."""
+"""Number of curves beside each other."""
 
 
 @styled
 def bench_figure(report: BenchReport) -> Figure:
-    """A bar a row: the median with all cores, a whisker to 95 %, one core as a tick.
+    """One bar per row: the median with all cores, a whisker to 95 %, one core as a tick.
 
-    The number at the right end is the median [ms].
-
-    The part of a bar below the machine's floor is dark: what is light could go, in principle.
-    The paper's value is a diamond, hollow where the paper used a GPU; peers are triangles.
+    The number at the right end is the median [ms]. The part of a bar below the machine's floor is
+    dark. The paper's value is a diamond, hollow where the paper used a GPU; peers are triangles.
     """
     rows = report.rows
     figure = Figure(figsize=(WIDE_IN, 0.30 * len(rows) + 1.45), layout="constrained")
@@ -52,7 +51,7 @@ def bench_figure(report: BenchReport) -> Figure:
     return figure
 
 
-def _limits(rows: list[RowResult]) -> tuple[float, float]:
+def _limits(rows: Sequence[RowResult]) -> tuple[float, float]:
     values = [lane.timing.median_ms for row in rows for lane in row.lanes]
     values += [row.best.timing.p95_ms for row in rows]
     values += [row.published_ms for row in rows if row.published_ms is not None]
@@ -82,12 +81,12 @@ def _draw_row(axes: Axes, place: int, row: RowResult, low: float) -> None:
             markerfacecolor="white" if row.published_on == "GPU" else PAPER, markeredgewidth=1.6,
         )  # fmt: skip
     axes.annotate(
-        _number(timing.median_ms), (1, place), (27, 0), xycoords=axes.get_yaxis_transform(),
+        milliseconds(timing.median_ms), (1, place), (27, 0), xycoords=axes.get_yaxis_transform(),
         textcoords="offset points", ha="right", va="center", color=HERE, fontweight="bold",
     )  # fmt: skip
 
 
-def _headings(axes: Axes, rows: list[RowResult]) -> None:
+def _headings(axes: Axes, rows: Sequence[RowResult]) -> None:
     """A line above each group but the first, and the group's name at its right end."""
     for place, row in enumerate(rows):
         if place == 0 or rows[place - 1].group != row.group:
@@ -100,9 +99,8 @@ def _headings(axes: Axes, rows: list[RowResult]) -> None:
 
 
 def _legend(figure: Figure, axes: Axes, report: BenchReport) -> None:
-    threads = report.machine.speeds[-1].threads
-    cores = "1 core" if threads == 1 else f"{threads} cores"
-    axes.barh(0, 0, color=HERE, alpha=0.45, label=f"here, {cores}: median, whisker to 95 %")
+    here = cores(report.machine.speeds[-1].threads)
+    axes.barh(0, 0, color=HERE, alpha=0.45, label=f"here, {here}: median, whisker to 95 %")
     axes.barh(0, 0, color=HERE, label="of it, the machine's floor")
     if any(len(row.lanes) > 1 for row in report.rows):
         axes.plot([], [], "|", color=INK, markersize=11, markeredgewidth=1.6, label="here, 1 core")
@@ -125,7 +123,7 @@ def _conditions(report: BenchReport) -> str:
 
 @styled
 def curves_figure(report: BenchReport) -> Figure:
-    """How each stage's time grows with one size, and the powers of the laws that fit best.
+    """Growth of each stage's time with one size, and the exponents of the fitted power laws.
 
     Medians by the clock in front, of the processor time of all threads behind.
     """
@@ -173,5 +171,11 @@ def _draw_curve(axes: Axes, curve: CurveResult) -> None:
         )  # fmt: skip
 
 
-def _number(value: float) -> str:
+def cores(threads: int) -> str:
+    """A number of cores in words."""
+    return "1 core" if threads == 1 else f"{threads} cores"
+
+
+def milliseconds(value: float) -> str:
+    """Three figures, or as many as there are before the point."""
     return f"{value:.0f}" if value >= 100 else f"{value:.3g}"

@@ -1,19 +1,74 @@
-"""Puts a benchmark's table and pictures into the docs: `python -m evaluation.bench.publish DIR`."""
+"""The benchmark as a table: on the screen, in Markdown, and with its pictures in the docs.
+
+`python -m evaluation.bench.publish DIR` puts the results in DIR into this checkout's docs.
+"""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
 
-from airground.errors import InputError
-from evaluation.bench.picture import bench_figure, curves_figure
-from evaluation.bench.report import BenchReport
-from evaluation.bench.table import markdown
-from evaluation.setup import console
-from evaluation.show.figures.style import PICTURE_DPI
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
 
+from airground.errors import InputError
+from evaluation.bench.picture import bench_figure, cores, curves_figure, milliseconds
+from evaluation.bench.report import KIND, BenchReport, CurveResult, LaneTiming, RowResult
+from evaluation.setup import console
+from evaluation.setup.checked_json import read_checked
+from evaluation.show.figures.style import PICTURE_DPI
+from evaluation.show.report.screen import live_rows
+
+ABSENT = "-"
+BUSY_CORES = 0.2
+"""Above this mean number of cores busy with other programs, a line warns of load."""
 BEGIN = "<!-- what airground bench found: begin -->"
 END = "<!-- what airground bench found: end -->"
+
+
+def print_table(report: BenchReport, screen: Console) -> None:
+    """Print the results and the conditions of the measurement."""
+    # Square brackets are units here, no markup.
+    shown = Table(title=Text("median, 95 % (calls) [ms]; the paper: Table I"), title_justify="left")
+    for index, title in enumerate(header(report)):
+        left = index == 0 or title == "peer"
+        shown.add_column(Text(title), justify="left" if left else "right", overflow="fold")
+    for words in body(report):
+        shown.add_row(*map(Text, words))
+    screen.print(shown)
+    growth = (
+        f"{title} over {parameter}: power {power}, of processor time {cpu_power} ({points} ms)"
+        for title, parameter, power, cpu_power, points in map(_curve, report.curves)
+    )
+    for line in (*footnotes(report), *growth):
+        screen.print(line, highlight=False, markup=False)
+
+
+def markdown(report: BenchReport) -> str:
+    """The table, the conditions and the exponents, for a page of the docs."""
+    lines = _markdown_table(header(report), body(report))
+    lines += ["", *(f"- {line}" for line in footnotes(report))]
+    if report.curves:
+        titles = ["time of", "over", "power", "of CPU time", "medians [ms]"]
+        lines += ["", *_markdown_table(titles, [_curve(curve) for curve in report.curves])]
+    return "\n".join(lines) + "\n"
+
+
+def publish(results: Path, docs: Path) -> None:
+    """Refresh `speed.md` and its pictures.
+
+    Args:
+        results: A folder that `airground bench --out` has written.
+        docs: The folder of the docs.
+    """
+    report = read_checked(BenchReport, results / "bench.json", KIND)
+    page = docs / "speed.md"
+    page.write_text(with_table(page.read_text(encoding="utf-8"), report), encoding="utf-8")
+    if report.rows:
+        bench_figure(report).savefig(docs / "pictures" / "bench.png", dpi=PICTURE_DPI)
+    if report.curves:
+        curves_figure(report).savefig(docs / "pictures" / "bench_curves.png", dpi=PICTURE_DPI)
 
 
 def with_table(page: str, report: BenchReport) -> str:
@@ -29,20 +84,110 @@ def with_table(page: str, report: BenchReport) -> str:
     return f"{before}{BEGIN}\n\n{markdown(report)}\n{END}{after}"
 
 
-def publish(results: Path, docs: Path) -> None:
-    """Refresh `speed.md` and its pictures.
+def header(report: BenchReport) -> list[str]:
+    """Titles of the columns."""
+    lanes = [cores(speed.threads) for speed in report.machine.speeds]
+    return ["stage [ms]", *lanes, "CPU", "paper", "target", "floor", "peer", "memory"]
 
-    Args:
-        results: The folder that `airground bench --out` has written.
-        docs: The folder of the docs.
-    """
-    report = BenchReport.read(results / "bench.json")
-    page = docs / "speed.md"
-    page.write_text(with_table(page.read_text(encoding="utf-8"), report), encoding="utf-8")
-    if report.rows:
-        bench_figure(report).savefig(docs / "pictures" / "bench.png", dpi=PICTURE_DPI)
-    if report.curves:
-        curves_figure(report).savefig(docs / "pictures" / "bench_curves.png", dpi=PICTURE_DPI)
+
+def body(report: BenchReport) -> list[list[str]]:
+    """One list of words for each row, and for each further peer of it."""
+    lines = []
+    for row in report.rows:
+        first, *others = _peers(row) or [ABSENT]
+        lines.append([row.title, *map(_lane, row.lanes), *_marks(row), first, _memory(row)])
+        width = len(lines[-1])
+        lines += [[*[""] * (width - 2), other, ""] for other in others]
+    return lines
+
+
+def footnotes(report: BenchReport) -> list[str]:
+    """The conditions of the measurement, one line each."""
+    machine = report.machine
+    lines = [
+        f"{cores(real.threads)}: {real.recorded_s:.0f} s recorded, {real.processing_s:.1f} s for "
+        f"the whole pipeline with SLAM: real-time factor {real.real_time_factor:.2f} "
+        f"({real.cpu_s:.1f} s of processor time{_peak(real.peak_memory_mib)})"
+        for real in report.pipeline
+    ]
+    lines += [
+        f"{cores(real.threads)}: {min(real.resident_mib):.0f} to {max(real.resident_mib):.0f} MiB "
+        f"held after the tenths of the recording, at the end {real.resident_mib[-1]:.0f}"
+        for real in report.pipeline
+        if real.resident_mib
+    ]
+    if report.live is not None:
+        for title, mav, ground in live_rows(report.live):
+            both = f"MAV {mav}, ground robot {ground}" if mav and ground else mav or ground
+            lines.append(f"live, {title}: {both}")
+    lines += [
+        f"{cores(speed.threads)}: {speed.bandwidth_gb_s:.1f} GB/s, "
+        f"{speed.arithmetic_gflop_s:.0f} Gflop/s as probed; floors come from these"
+        for speed in machine.speeds
+    ]
+    others = machine.other_cores
+    busy = "unknown" if others is None else f"{others:.2f} cores busy"
+    if others is not None and others > BUSY_CORES:
+        lines.insert(0, "measured under load: times by the clock are too long, floors apart")
+    lines.append(
+        f"load average {machine.load_before.one_minute:.2f} before, "
+        f"{machine.load_after.one_minute:.2f} after; other programs: {busy}"
+    )
+    recording = report.recording
+    lines.append(
+        f"{machine.cpu}; {recording.scene} (seed {recording.seed}, sensors {recording.sensors}); "
+        f"{report.git_revision}; {report.date}"
+    )
+    lines += [
+        f"{row.title}: {', '.join(row.missing_peers)} not installed"
+        for row in report.rows
+        if row.missing_peers
+    ]
+    return lines
+
+
+def _markdown_table(titles: list[str], rows: list[list[str]]) -> list[str]:
+    return ["| " + " | ".join(words) + " |" for words in (titles, ["---"] * len(titles), *rows)]
+
+
+def _curve(curve: CurveResult) -> list[str]:
+    """Stage, parameter, both powers, and the times by value."""
+    points = (f"{point.value:g}: {_ms(point.timing.median_ms)}" for point in curve.points)
+    powers = f"{curve.exponent:.2f}", f"{curve.cpu_exponent:.2f}"
+    return [curve.title, curve.parameter, *powers, ", ".join(points)]
+
+
+def _lane(lane: LaneTiming) -> str:
+    """Median, 95th percentile and count; the mean where few calls are much longer than most."""
+    timing = lane.timing
+    words = f"{_ms(timing.median_ms)}, {_ms(timing.p95_ms)} ({timing.n})"
+    skewed = timing.mean_ms > 1.2 * timing.median_ms
+    return f"{words}, mean {_ms(timing.mean_ms)}" if skewed else words
+
+
+def _marks(row: RowResult) -> list[str]:
+    gpu = " GPU" if row.published_on == "GPU" else ""
+    published = ABSENT if row.published_ms is None else f"{row.published_ms:g}{gpu}"
+    best = row.best
+    return [_ms(best.timing.cpu_median_ms), published, _ms(row.target_ms), _ms(best.floor_ms)]
+
+
+def _peers(row: RowResult) -> list[str]:
+    return [
+        f"{peer.name} {_ms(peer.timing.median_ms)} ({peer.times_ours:.1f}x)" for peer in row.peers
+    ]
+
+
+def _memory(row: RowResult) -> str:
+    return ABSENT if row.peak_memory_mib is None else f"{row.peak_memory_mib:.0f} MiB"
+
+
+def _peak(memory_mib: float | None) -> str:
+    return "" if memory_mib is None else f", {memory_mib:.0f} MiB at the peak"
+
+
+def _ms(value: float | None) -> str:
+    return ABSENT if value is None else milliseconds(value)
 
 
 def main() -> int:

@@ -3,52 +3,46 @@
 from __future__ import annotations
 
 from itertools import chain
-from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from evaluation.bench.load import LoadAverage
-from evaluation.bench.sampler import Turn
+from evaluation.bench.floors import Floor, Speed
+from evaluation.bench.machine import LoadAverage
+from evaluation.bench.work import Turn
 from evaluation.judge.live_summary import LiveSummary
-from evaluation.setup.checked_json import read_checked
+from evaluation.setup.checked_json import Amount, Part
 
 SCHEMA: Literal[1] = 1
+KIND = "benchmark"
+"""What an error message calls the file."""
 
-Number = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Count = Annotated[int, Field(ge=1)]
-
-
-class Part(BaseModel):
-    """A frozen group of figures that refuses keys it does not know."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
+Positive = Annotated[int, Field(ge=1)]
 
 
 class Timing(Part):
-    """What the calls took by the clock, and in the median of processor time.
+    """Times of the calls by the clock, and the median of their processor time.
 
     `cpu_median_ms` counts all threads; null where it was not measured.
     """
 
-    n: Count
-    mean_ms: Number
-    median_ms: Number
-    p95_ms: Number
-    least_ms: Number
-    cpu_median_ms: Number | None = None
+    n: Positive
+    mean_ms: Amount
+    median_ms: Amount
+    p95_ms: Amount
+    least_ms: Amount
+    cpu_median_ms: Amount | None = None
 
     @classmethod
     def of(cls, turns: list[Turn]) -> Self:
         """Of calls that were measured in full."""
         samples = list(chain.from_iterable(turns))
-        timing = cls.of_times([sample.wall_ms for sample in samples])
-        cpu = float(np.median([sample.cpu_ms for sample in samples]))
-        return timing.model_copy(update={"cpu_median_ms": cpu})
+        cpu_median_ms = float(np.median([sample.cpu_ms for sample in samples]))
+        return cls.of_times([sample.wall_ms for sample in samples], cpu_median_ms)
 
     @classmethod
-    def of_times(cls, times_ms: list[float]) -> Self:
+    def of_times(cls, times_ms: list[float], cpu_median_ms: float | None = None) -> Self:
         """Of times by one clock alone."""
         median, p95 = np.percentile(times_ms, [50, 95])
         return cls(
@@ -57,34 +51,28 @@ class Timing(Part):
             median_ms=float(median),
             p95_ms=float(p95),
             least_ms=min(times_ms),
+            cpu_median_ms=cpu_median_ms,
         )
 
 
 class LaneTiming(Part):
-    """A row with so many cores; `floor_ms` is null where nobody can say."""
+    """A row on a number of cores; `floor_ms` is null where no floor is known."""
 
-    threads: Count
+    threads: Positive
     timing: Timing
-    floor_ms: Number | None = None
+    floor_ms: Amount | None = None
 
 
 class PeerTiming(Part):
     """Another library on the same data, in turns with the row, on all cores.
 
-    `times_ours` is its time over ours, in the median over the rounds; above 1 it is slower.
+    `times_ours` is its time over ours, the median over the rounds; above 1 it is slower.
     """
 
     name: str
     differs: str
     timing: Timing
-    times_ours: Number
-
-
-class FloorCounts(Part):
-    """What any program must do for one call."""
-
-    bytes_moved: Number
-    operations: Number
+    times_ours: Amount
 
 
 class RowResult(Part):
@@ -98,14 +86,14 @@ class RowResult(Part):
     title: str
     group: str
     size: str
-    published_ms: Number | None
+    published_ms: Amount | None
     published_on: str
-    target_ms: Number | None
-    lanes: list[LaneTiming]
-    peers: list[PeerTiming] = []
-    missing_peers: list[str] = []
-    floor: FloorCounts | None = None
-    peak_memory_mib: Number | None = None
+    target_ms: Amount | None
+    lanes: tuple[LaneTiming, ...]
+    peers: tuple[PeerTiming, ...] = ()
+    missing_peers: tuple[str, ...] = ()
+    floor: Floor | None = None
+    peak_memory_mib: Amount | None = None
 
     @property
     def best(self) -> LaneTiming:
@@ -116,48 +104,40 @@ class RowResult(Part):
 class RealTime(Part):
     """The whole pipeline with SLAM over the recording, as fast as it goes.
 
-    `peak_memory_mib` is what this added to the process, `resident_mib` all that the process
+    `peak_memory_mib` is what this added to the processes, `resident_mib` all that the processes
     held after each tenth of the recording.
     """
 
-    threads: Count
-    recorded_s: Number
-    processing_s: Number
-    cpu_s: Number
-    real_time_factor: Number
-    peak_memory_mib: Number | None
-    resident_mib: list[Number] = []
-
-
-class LaneSpeed(Part):
-    """What so many cores can do, as probed."""
-
-    threads: Count
-    bandwidth_gb_s: Number
-    arithmetic_gflop_s: Number
+    threads: Positive
+    recorded_s: Amount
+    processing_s: Amount
+    cpu_s: Amount
+    real_time_factor: Amount
+    peak_memory_mib: Amount | None
+    resident_mib: tuple[Amount, ...] = ()
 
 
 class Machine(Part):
-    """Where it ran, and what else did.
+    """Where the benchmark ran, and under which load.
 
-    `other_cores` is how many cores other programs kept busy meanwhile, null if not known.
+    `other_cores` is the mean number of cores that other programs kept busy, null if unknown.
     """
 
     cpu: str
-    cores: Count
-    speeds: list[LaneSpeed]
+    cores: Positive
+    speeds: tuple[Speed, ...]
     load_before: LoadAverage
     load_after: LoadAverage
-    other_cores: Number | None
+    other_cores: Amount | None
 
 
 class RecordingInfo(Part):
-    """What was worked on."""
+    """The recording that was worked on."""
 
     scene: str
     seed: int
     sensors: str
-    duration_s: Number
+    duration_s: Amount
 
 
 class CurvePointTiming(Part):
@@ -177,7 +157,7 @@ class CurveResult(Part):
     name: str
     title: str
     parameter: str
-    points: list[CurvePointTiming]
+    points: tuple[CurvePointTiming, ...]
     exponent: float
     cpu_exponent: float
 
@@ -189,24 +169,13 @@ class BenchReport(Part):
     version: str
     git_revision: str
     date: str
-    seconds_a_row: Number
+    seconds_a_row: Amount
     machine: Machine
     recording: RecordingInfo
-    rows: list[RowResult]
-    pipeline: list[RealTime] = []
+    rows: tuple[RowResult, ...]
+    pipeline: tuple[RealTime, ...] = ()
     live: LiveSummary | None = None
-    curves: list[CurveResult] = []
-
-    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+    curves: tuple[CurveResult, ...] = ()
 
     def to_json(self) -> str:
         return self.model_dump_json(by_alias=True, indent=2) + "\n"
-
-    @classmethod
-    def read(cls, path: Path) -> Self:
-        """Read a file that a benchmark wrote.
-
-        Raises:
-            InputError: It is none, or of another version.
-        """
-        return read_checked(cls, path, "benchmark")

@@ -2,14 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 from airground.errors import InputError
-from evaluation.bench import dense_rows, localization_rows, map_rows, peers
-from evaluation.bench.row import Peer, Row, of_table
-from evaluation.setup.published import TimedStage
+from evaluation.bench import dense_rows, localization_rows
+from evaluation.bench.material import Material
+from evaluation.bench.peers import PEERS, Peer
+from evaluation.bench.work import Work
+from evaluation.setup.published import TABLE_I, TimedStage
 
-DENSE, GLOBAL = "Dense reconstruction", "Global localization"
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table.
+
+    Attributes:
+        stage: Name, title, group, and the time published in the paper.
+        make: Makes the work from the material.
+        target_ms: Median aimed at on two idle cores [ms]; None where no aim is set.
+    """
+
+    stage: TimedStage
+    make: Callable[[Material], Work]
+    target_ms: float | None = None
+
+    @property
+    def name(self) -> str:
+        return self.stage.metric
+
+    @property
+    def peers(self) -> tuple[Peer, ...]:
+        """The same work by other libraries."""
+        return PEERS.get(self.name, ())
+
+
+class Contender(NamedTuple):
+    """A row's own work, or that of one of its peers."""
+
+    row: str
+    peer: str | None = None
+
+
+STAGES = {stage.metric: stage for stage in TABLE_I}
+EGOMOTION, DENSE, GLOBAL = "Egomotion", "Dense reconstruction", "Global localization"
 REFINEMENT, INPUT = "Pose refinement", "Input"
 
 
@@ -19,138 +56,46 @@ def _ours(metric: str, title: str, group: str) -> TimedStage:
 
 
 ROWS = (
-    Row(
-        of_table("ground_map"),
-        map_rows.ground_map,
-        None,
-        (
-            Peer(
-                "Open3D",
-                "open3d",
-                "half a pixel off, beside jumps in depth too; no image is kept to fuse anew",
-                peers.fuse_keyframe,
-            ),
-        ),
-    ),
-    Row(
-        _ours("ground_surface", "Points of the ground map", "Egomotion"),
-        map_rows.ground_surface,
-        None,
-        (
-            Peer(
-                "Open3D",
-                "open3d",
-                "in no lasting order, and without a surface that lies on voxels exactly",
-                peers.extract_ground,
-            ),
-        ),
-    ),
-    Row(
-        of_table("add_frame"),
-        dense_rows.add_frame,
-        9,
-        (
-            Peer(
-                "OpenCV, plane by plane",
-                "cv2",
-                "samples the view halved, so blurred; no gain, no record of what is covered",
-                peers.plane_by_plane,
-            ),
-        ),
-    ),
-    Row(of_table("depth_map"), dense_rows.depth_map),
-    Row(
-        of_table("distance_field"),
-        dense_rows.distance_field,
-        10,
-        (
-            Peer(
-                "Open3D TSDF",
-                "open3d",
-                "a running mean near the surface only, no histogram",
-                peers.integrate_one,
-            ),
-        ),
-    ),
-    Row(of_table("fusion"), dense_rows.fusion, 150),
-    Row(of_table("ray_cast"), dense_rows.ray_cast, 10),
-    Row(
-        _ours("surface", "All of a surface from its depth maps", DENSE),
-        dense_rows.surface,
-        None,
-        (
-            Peer(
-                "Open3D TSDF",
-                "open3d",
-                "a running mean, no regularization; every crossing, not only what the view sees",
-                peers.integrate_and_extract,
-            ),
-        ),
-    ),
-    Row(of_table("height_map"), localization_rows.height_maps),
-    Row(
-        of_table("cost_map"),
-        localization_rows.cost_map,
-        6,
-        (
-            Peer(
-                "scikit-image, masked",
-                "skimage",
-                "correlation instead of Eq. 2, over every offset with overlap, and its peak",
-                peers.masked_correlation,
-            ),
-            Peer(
-                "OpenCV, matchTemplate",
-                "cv2",
-                "correlation instead of Eq. 2; the ground map's holes count as its mean",
-                peers.match_template,
-            ),
-        ),
-    ),
+    Row(STAGES["ground_map"], dense_rows.ground_map),
+    Row(_ours("ground_surface", "Points of the ground map", EGOMOTION), dense_rows.ground_surface),
+    Row(STAGES["add_frame"], dense_rows.add_frame, 9),
+    Row(STAGES["depth_map"], dense_rows.depth_map),
+    Row(STAGES["distance_field"], dense_rows.distance_field, 10),
+    Row(STAGES["fusion"], dense_rows.fusion, 150),
+    Row(STAGES["ray_cast"], dense_rows.ray_cast, 10),
+    Row(_ours("surface", "All of a surface from its depth maps", DENSE), dense_rows.surface),
+    Row(STAGES["height_map"], localization_rows.height_maps),
+    Row(STAGES["cost_map"], localization_rows.cost_map, 6),
     Row(
         _ours("cost_map_ncc", "Full cost map, by correlation", GLOBAL),
         localization_rows.cost_map_correlation,
         6,
     ),
     Row(
-        _ours("headings", "Search over 360 headings", GLOBAL),
-        localization_rows.heading_search,
-        450,
+        _ours("headings", "Search over 360 headings", GLOBAL), localization_rows.heading_search, 450
     ),
-    Row(of_table("particles"), localization_rows.particles, 3),
+    Row(STAGES["particles"], localization_rows.particles, 3),
     Row(
         _ours("particles_heading", "200 particles with heading", GLOBAL),
         localization_rows.particles_heading,
         3,
     ),
-    Row(
-        of_table("icp"),
-        map_rows.icp,
-        200,
-        (
-            Peer(
-                "Open3D ICP",
-                "open3d",
-                "no trimming, and one distance for all steps",
-                peers.open3d_icp,
-            ),
-        ),
-    ),
-    Row(_ours("refinement", "Local search and ICP", REFINEMENT), map_rows.refinement),
-    Row(of_table("augmentation"), map_rows.augmentation),
-    Row(_ours("read_grey", "Read and decode, MAV", INPUT), map_rows.read_grey),
-    Row(_ours("read_rgbd", "Read and decode, ground robot", INPUT), map_rows.read_colour_depth),
+    Row(STAGES["icp"], localization_rows.icp, 200),
+    Row(_ours("refinement", "Local search and ICP", REFINEMENT), localization_rows.refinement),
+    Row(STAGES["augmentation"], localization_rows.augmentation),
+    Row(_ours("read_grey", "Read and decode, MAV", INPUT), dense_rows.read_grey),
+    Row(_ours("read_rgbd", "Read and decode, ground robot", INPUT), dense_rows.read_colour_depth),
 )
 
 PLAYED = {
-    "mono_slam": (of_table("mono_slam"), "mav", 8.0),
-    "rgbd_slam": (of_table("rgbd_slam"), "ground", 8.0),
+    "mono_slam": (STAGES["mono_slam"], "mav", 8.0),
+    "rgbd_slam": (STAGES["rgbd_slam"], "ground", 8.0),
 }
 """Rows that are timed while the whole recording is played: stage, robot, target [ms]."""
 PIPELINE = "pipeline"
 """The row of the whole pipeline: its real-time factor."""
 LIVE = "live"
-"""The row of a live run: images dropped, and how late poses come."""
+"""The row of a live run: images dropped, and delays of the poses."""
 NAMES = (*PLAYED, PIPELINE, LIVE, *(row.name for row in ROWS))
 BY_NAME = {row.name: row for row in ROWS}
 

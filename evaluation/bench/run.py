@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 from airground.io.recording import Recording
 from evaluation.bench.curves import CURVES, Curve, CurvePoint, exponent
-from evaluation.bench.lane import Facts, Opened
-from evaluation.bench.lane_process import lane_processes
-from evaluation.bench.load import LoadAverage, LoadMeter, load_average
-from evaluation.bench.material import Played
+from evaluation.bench.floors import Speed
+from evaluation.bench.lane import Facts, Opened, lane_processes
+from evaluation.bench.machine import LoadAverage, LoadMeter, load_average
 from evaluation.bench.report import (
     SCHEMA,
     BenchReport,
     CurvePointTiming,
     CurveResult,
-    FloorCounts,
-    LaneSpeed,
     LaneTiming,
     Machine,
     PeerTiming,
@@ -30,17 +27,14 @@ from evaluation.bench.report import (
     RowResult,
     Timing,
 )
-from evaluation.bench.row import Contender, Row, Speed
-from evaluation.bench.rows import BY_NAME, LIVE, PIPELINE, PLAYED
-from evaluation.bench.sampler import Turn, interleaved, wall_ratio
+from evaluation.bench.rows import BY_NAME, LIVE, PIPELINE, PLAYED, Contender, Row
+from evaluation.bench.work import Turn, interleaved, wall_ratio
+from evaluation.setup.published import TimedStage
 from evaluation.setup.run_info import RunInfo
-
-Say = Callable[[str], None]
-"""Is told what is being done."""
 
 
 class AnyLane(Protocol):
-    """A lane, here or in another process."""
+    """A lane in this process or in one of its own."""
 
     def facts(self, row: str) -> Facts: ...
     def take_turn(self, contender: Contender | CurvePoint, seconds: float) -> Turn: ...
@@ -54,17 +48,17 @@ def run_benchmark(
     threads: int,
     seconds_a_row: float,
     with_curves: bool,
-    say: Say,
+    say: Callable[[str], None],
 ) -> BenchReport:
     """Time rows on one core and on all.
 
     Args:
         path: A recording of both robots.
-        names: Of the rows.
-        threads: Of the lane that uses all cores.
-        seconds_a_row: For a row with its peers.
+        names: Names of the rows.
+        threads: Number of cores of the lane that uses all.
+        seconds_a_row: Time for a row with its peers [s].
         with_curves: Also vary the sizes.
-        say: Is told what is being done.
+        say: Takes a line about each step.
     """
     info = RunInfo.here(seed=0)
     recording = Recording.open(path)
@@ -81,11 +75,9 @@ def run_benchmark(
         for process in processes:
             say(f"playing {recording.scene} through the pipeline, threads: {process.threads}")
             opened[process.threads] = process.open(path, whole)
-        one_core = opened[1].speed
-        speeds = {count: one.speed.at_least(one_core) for count, one in opened.items()}
+        speeds = {count: one.speed.at_least(opened[1].speed) for count, one in opened.items()}
         lanes: dict[int, AnyLane] = {process.threads: process for process in processes}
-        played = {count: one.played for count, one in opened.items() if one.played is not None}
-        rows = [played_row(name, played) for name in names if name in PLAYED]
+        rows = [played_row(name, opened) for name in names if name in PLAYED]
         for name in names:
             if name in BY_NAME:
                 say(BY_NAME[name].stage.title)
@@ -107,10 +99,10 @@ def run_benchmark(
             sensors=recording.sensors,
             duration_s=recording.duration_s,
         ),
-        rows=rows,
-        pipeline=_real_time(opened) if PIPELINE in names else [],
+        rows=tuple(rows),
+        pipeline=_pipeline(opened) if PIPELINE in names else (),
         live=live,
-        curves=curves,
+        curves=tuple(curves),
     )
 
 
@@ -118,73 +110,73 @@ def timed_row(
     row: Row, lanes: dict[int, AnyLane], speeds: dict[int, Speed], seconds: float
 ) -> RowResult:
     """A row on all its lanes and its peers on the widest, in turns."""
-    facts = {count: lane.facts(row.name) for count, lane in lanes.items()}
-    widest = max(lanes)
-    known = facts[widest]
-    own = Contender(row.name)
+    known = {count: lane.facts(row.name) for count, lane in lanes.items()}[max(lanes)]
+    widest, own = max(lanes), Contender(row.name)
+    peers = {name: Contender(row.name, name) for name in known.peers}
     contenders = {(count, own): partial(lane.take_turn, own) for count, lane in lanes.items()}
-    for name in known.peers:
-        peer = Contender(row.name, name)
+    for peer in peers.values():
         contenders[widest, peer] = partial(lanes[widest].take_turn, peer)
     turns = interleaved(contenders, seconds)
-    floor = known.floor
-    lane_timings = [
+    floor, differs = known.floor, {peer.name: peer.differs for peer in row.peers}
+    lane_timings = (
         LaneTiming(
             threads=count,
             timing=Timing.of(turns[count, own]),
             floor_ms=None if floor is None else floor.least_ms(speeds[count]),
         )
         for count in sorted(lanes)
-    ]
-    peers = [
+    )
+    peer_timings = (
         PeerTiming(
             name=name,
-            differs=row.peer(name).differs,
-            timing=Timing.of(turns[widest, Contender(row.name, name)]),
-            times_ours=wall_ratio(turns[widest, Contender(row.name, name)], turns[widest, own]),
+            differs=differs[name],
+            timing=Timing.of(turns[widest, peer]),
+            times_ours=wall_ratio(turns[widest, peer], turns[widest, own]),
         )
-        for name in known.peers
-    ]
-    return RowResult(
-        name=row.name,
-        title=row.stage.title,
-        group=row.stage.group,
-        size=known.size,
-        published_ms=row.stage.published_ms,
-        published_on=row.stage.processor,
-        target_ms=row.target_ms,
-        lanes=lane_timings,
-        peers=peers,
-        missing_peers=list(known.missing),
-        floor=None
-        if floor is None
-        else FloorCounts(bytes_moved=floor.bytes_moved, operations=floor.operations),
+        for name, peer in peers.items()
+    )
+    return _result(
+        row.stage,
+        row.target_ms,
+        known.size,
+        lane_timings,
+        peers=tuple(peer_timings),
+        missing_peers=known.missing,
+        floor=floor,
         peak_memory_mib=lanes[widest].peak_memory_mib(row.name),
     )
 
 
-def played_row(name: str, played: dict[int, Played]) -> RowResult:
+def played_row(name: str, opened: dict[int, Opened]) -> RowResult:
     """A row that was timed image by image while the recording was played."""
     stage, robot, target_ms = PLAYED[name]
     lanes = [
-        LaneTiming(threads=count, timing=Timing.of_times(one.frame_ms[robot]))
-        for count, one in sorted(played.items())
+        LaneTiming(threads=count, timing=Timing.of_times(one.played.frame_ms[robot]))
+        for count, one in sorted(opened.items())
+        if one.played is not None
     ]
+    size = f"{lanes[0].timing.n} images, mapping included, processor time"
+    return _result(stage, target_ms, size, lanes)
+
+
+def _result(
+    stage: TimedStage, target_ms: float | None, size: str, lanes: Iterable[LaneTiming], **more: Any
+) -> RowResult:
     return RowResult(
-        name=name,
+        name=stage.metric,
         title=stage.title,
         group=stage.group,
-        size=f"{lanes[0].timing.n} images, mapping included, processor time",
+        size=size,
         published_ms=stage.published_ms,
         published_on=stage.processor,
         target_ms=target_ms,
-        lanes=lanes,
+        lanes=tuple(lanes),
+        **more,
     )
 
 
 def timed_curve(curve: Curve, lane: AnyLane, seconds: float) -> CurveResult:
     """A curve's points, in turns."""
-    lane.clear()
     points = [CurvePoint(curve.name, value) for value in curve.values]
     turns = interleaved({point: partial(lane.take_turn, point) for point in points}, seconds)
     lane.clear()
@@ -193,7 +185,7 @@ def timed_curve(curve: Curve, lane: AnyLane, seconds: float) -> CurveResult:
         name=curve.name,
         title=curve.title,
         parameter=curve.parameter,
-        points=[CurvePointTiming(value=v, timing=timing) for v, timing in timings.items()],
+        points=tuple(CurvePointTiming(value=v, timing=timing) for v, timing in timings.items()),
         exponent=exponent(curve.values, [timing.median_ms for timing in timings.values()]),
         cpu_exponent=exponent(
             curve.values, [timing.cpu_median_ms or math.nan for timing in timings.values()]
@@ -201,20 +193,8 @@ def timed_curve(curve: Curve, lane: AnyLane, seconds: float) -> CurveResult:
     )
 
 
-def _real_time(opened: dict[int, Opened]) -> list[RealTime]:
-    return [
-        RealTime(
-            threads=count,
-            recorded_s=played.recorded_s,
-            processing_s=played.processing_s,
-            cpu_s=played.cpu_s,
-            real_time_factor=played.recorded_s / played.processing_s,
-            peak_memory_mib=one.peak_memory_mib,
-            resident_mib=played.resident_mib,
-        )
-        for count, one in sorted(opened.items())
-        if (played := one.played) is not None
-    ]
+def _pipeline(opened: dict[int, Opened]) -> tuple[RealTime, ...]:
+    return tuple(one.played.pipeline for _, one in sorted(opened.items()) if one.played is not None)
 
 
 def _machine(
@@ -223,14 +203,7 @@ def _machine(
     return Machine(
         cpu=info.cpu,
         cores=info.cores,
-        speeds=[
-            LaneSpeed(
-                threads=count,
-                bandwidth_gb_s=speed.bytes_per_s / 1e9,
-                arithmetic_gflop_s=speed.operations_per_s / 1e9,
-            )
-            for count, speed in sorted(speeds.items())
-        ],
+        speeds=tuple(speed for _, speed in sorted(speeds.items())),
         load_before=load_before,
         load_after=load_average(),
         other_cores=meter.other_cores(),

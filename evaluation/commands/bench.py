@@ -45,9 +45,9 @@ class Bench(Verb, SensorWord, SeedWord):
 
         from rich.console import Console
 
+        from evaluation.bench.publish import print_table
         from evaluation.bench.rows import checked_names
         from evaluation.bench.run import run_benchmark
-        from evaluation.bench.table import print_table
         from evaluation.setup.output import check_free
 
         names = checked_names([name for name in self.rows.split(",") if name])
@@ -82,7 +82,7 @@ class Bench(Verb, SensorWord, SeedWord):
         if self.out is None:
             return
         from evaluation.bench.picture import bench_figure, curves_figure
-        from evaluation.bench.table import markdown
+        from evaluation.bench.publish import markdown
         from evaluation.setup.output import fresh_folder
         from evaluation.show.figures.style import save_figure
 

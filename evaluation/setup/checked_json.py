@@ -40,6 +40,7 @@ def read_checked(model: type[Model], path: Path, kind: str) -> Model:
 Share = Annotated[float, Field(ge=0, le=1)]
 Number = Annotated[float, Field(allow_inf_nan=False)] | None
 """Null where nothing was measured, or where failures make it infinite."""
+Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Count = Annotated[int, Field(ge=0)]
 
 

@@ -1,8 +1,8 @@
-"""What must be settled before the first heavy import: threads, memory and how to render.
+"""Settings that must precede the first heavy import: threads, memory and how to render.
 
 Policy: BLAS gets one thread, since the matrices here are small and its results would depend
-on the number; numba's and OpenMP's loops, which give the same result however they are
-split, get one per core, and OpenCV the same.
+on the number. Loops of numba, OpenMP and OpenCV, whose results do not depend on how they are
+split, get one per core.
 """
 
 from __future__ import annotations
@@ -11,14 +11,15 @@ import ctypes
 import gc
 import math
 import os
+import sys
 from pathlib import Path
 
 from airground.errors import InputError
 
 CPU_QUOTA = Path("/sys/fs/cgroup/cpu.max")
-"""Where a container says how much of the machine it may use: "QUOTA PERIOD" or "max PERIOD"."""
+"""The processor time that a container may use: "QUOTA PERIOD" or "max PERIOD"."""
 KEPT_BYTES = 256 * 2**20
-"""Freed memory that a process keeps for itself."""
+"""Freed memory that a process keeps for itself: some volumes and depth maps."""
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of glibc's malloc.h
 
 
@@ -33,10 +34,10 @@ def usable_cores(quota_file: Path = CPU_QUOTA) -> int:
 
 
 def prepare(threads: int | None = None) -> int:
-    """Set the environment for this process and its children; what the user set stays.
+    """Set the environment of this process and its children; variables that are set stay.
 
     Args:
-        threads: Threads to use; None for one per usable core.
+        threads: Number of threads, which replaces what is set; None for one per usable core.
 
     Returns:
         The number of threads.
@@ -53,9 +54,9 @@ def prepare(threads: int | None = None) -> int:
         if threads is not None:
             os.environ[name] = str(count)
         os.environ.setdefault(name, str(count))
-    # Threads that wait for each other sleep: spinning, they take cores from whoever has work.
+    # Threads that wait for each other sleep: spinning, they take cores from threads with work.
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
-    # OpenMP first: an outdated TBB, which numba would prefer, makes it complain on every run.
+    # OpenMP first: with an outdated TBB, which numba would prefer, each run prints a warning.
     os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp tbb workqueue")
     backend = "egl" if _loads("libEGL.so.1") else "osmesa"
     os.environ.setdefault("MUJOCO_GL", backend)
@@ -64,12 +65,23 @@ def prepare(threads: int | None = None) -> int:
     return count
 
 
-def settle() -> None:
-    """To be called when all is loaded and compiled: what lives by then is there to stay.
+def prepare_worker(threads: int) -> None:
+    """Set the environment of a worker process; with one thread, bind it to one core.
 
-    Libraries leave some 300 000 objects. Each full collection of garbage would go through all of
-    them again, and for 0.13 s no image would be tracked. Only the first call of a process counts,
-    since what a later one would keep may well become garbage.
+    What libraries print goes to stderr, away from the results on stdout.
+    """
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    if threads == 1:
+        os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
+    prepare(threads)
+
+
+def settle() -> None:
+    """Exclude all present objects from garbage collection; call it when all is compiled.
+
+    Libraries leave some 300 000 objects. A full collection would visit each of them, and no image
+    would be tracked for 0.13 s. Only the first call of a process has an effect, since objects of
+    later calls may become garbage.
     """
     if gc.get_freeze_count() == 0:
         gc.collect()
@@ -77,11 +89,11 @@ def settle() -> None:
 
 
 def _keep_freed_memory() -> None:
-    """Have the allocator keep what images and volumes leave for the next ones.
+    """Keep the memory of freed images and volumes for the next ones.
 
-    By default glibc hands every array of more than some 100 kB back to the system, which has
-    to clear its pages again for the next one: a fifth of the time of reading an image. Other C
-    libraries have no such setting and are left alone. Children read theirs from the environment.
+    By default glibc returns every array of more than some 100 kB to the system, which clears
+    its pages again for the next one: a fifth of the time of reading an image. Other C libraries
+    have no such setting. Children read theirs from the environment.
     """
     for name in ("MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_"):
         os.environ.setdefault(name, str(KEPT_BYTES))
@@ -94,8 +106,8 @@ def _keep_freed_memory() -> None:
 
 
 def hand_back_memory() -> None:
-    """Return to the system what was kept of freed memory, before other work begins."""
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # only glibc can be asked
+    """Return the freed memory that was kept to the system, before other work begins."""
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # glibc only
     if trim is not None:
         trim(0)
 

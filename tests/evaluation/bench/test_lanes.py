@@ -9,7 +9,7 @@ import time
 import pytest
 
 from airground.errors import AirgroundError
-from evaluation.bench.lane_process import lane_processes
+from evaluation.bench.lane import lane_processes
 from evaluation.setup.environment import usable_cores
 
 
@@ -22,12 +22,12 @@ def die() -> None:
     os._exit(1)
 
 
-def test_a_lane_of_one_core_is_bound_to_it_and_speaks_on_stderr(
+def test_a_lane_of_one_core_is_bound_to_it_and_prints_to_stderr(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     here = len(os.sched_getaffinity(0))
     with lane_processes(sorted({1, usable_cores()})) as lanes:
-        found = [lane._ask(cores_and_threads) for lane in lanes]
+        found = [lane.ask(cores_and_threads) for lane in lanes]
     assert found[0] == (1, "1")
     assert found[-1] == (here if usable_cores() > 1 else 1, str(usable_cores()))
     said = capfd.readouterr()
@@ -35,9 +35,9 @@ def test_a_lane_of_one_core_is_bound_to_it_and_speaks_on_stderr(
     assert "a library says something" in said.err
 
 
-def test_a_death_is_told() -> None:
+def test_a_process_that_dies_is_an_error() -> None:
     with lane_processes([1]) as lanes, pytest.raises(AirgroundError, match="a process died"):
-        lanes[0]._ask(die)
+        lanes[0].ask(die)
 
 
 def interrupted_while_a_lane_works() -> None:

@@ -15,15 +15,25 @@ from rich.console import Console
 
 from airground.errors import InputError
 from evaluation import cli
-from evaluation.bench.load import LoadAverage
+from evaluation.bench.floors import Speed
+from evaluation.bench.machine import LoadAverage
 from evaluation.bench.picture import bench_figure, curves_figure
-from evaluation.bench.publish import BEGIN, END, publish, with_table
+from evaluation.bench.publish import (
+    BEGIN,
+    END,
+    body,
+    header,
+    markdown,
+    print_table,
+    publish,
+    with_table,
+)
 from evaluation.bench.report import (
+    KIND,
     SCHEMA,
     BenchReport,
     CurvePointTiming,
     CurveResult,
-    LaneSpeed,
     LaneTiming,
     Machine,
     PeerTiming,
@@ -32,9 +42,9 @@ from evaluation.bench.report import (
     RowResult,
     Timing,
 )
-from evaluation.bench.sampler import Sample
-from evaluation.bench.table import body, header, markdown, print_table
+from evaluation.bench.work import Sample
 from evaluation.judge.live_summary import live_summary
+from evaluation.setup.checked_json import read_checked
 from tests.evaluation.synthetic_results import live_rows
 
 
@@ -73,8 +83,8 @@ def report() -> BenchReport:
             cpu="CPU",
             cores=2,
             speeds=[
-                LaneSpeed(threads=1, bandwidth_gb_s=20, arithmetic_gflop_s=100),
-                LaneSpeed(threads=2, bandwidth_gb_s=30, arithmetic_gflop_s=200),
+                Speed(threads=1, bandwidth_gb_s=20, arithmetic_gflop_s=100),
+                Speed(threads=2, bandwidth_gb_s=30, arithmetic_gflop_s=200),
             ],
             load_before=LoadAverage(0.1, 0.2, 0.3),
             load_after=LoadAverage(1.1, 0.2, 0.3),
@@ -113,7 +123,7 @@ def texts(figure: Figure) -> list[str]:
 def test_json_round_trip(report: BenchReport, tmp_path: Path) -> None:
     path = tmp_path / "bench.json"
     path.write_text(report.to_json(), encoding="utf-8")
-    assert BenchReport.read(path) == report
+    assert read_checked(BenchReport, path, KIND) == report
     assert json.loads(report.to_json())["schema"] == SCHEMA
 
 
@@ -121,12 +131,12 @@ def test_another_schema_or_no_json_is_refused(report: BenchReport, tmp_path: Pat
     path = tmp_path / "bench.json"
     path.write_text(report.to_json().replace('"schema": 1', '"schema": 2'), encoding="utf-8")
     with pytest.raises(InputError, match="schema"):
-        BenchReport.read(path)
+        read_checked(BenchReport, path, KIND)
     path.write_text("{", encoding="utf-8")
     with pytest.raises(InputError, match="no benchmark"):
-        BenchReport.read(path)
+        read_checked(BenchReport, path, KIND)
     with pytest.raises(InputError, match="cannot be read"):
-        BenchReport.read(tmp_path / "nothing.json")
+        read_checked(BenchReport, tmp_path / "nothing.json", KIND)
 
 
 def test_a_timing_holds_the_median_the_95th_percentile_and_the_count() -> None:

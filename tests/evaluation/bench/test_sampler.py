@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from evaluation.bench.row import Work
-from evaluation.bench.sampler import LEAST_ROUNDS, Sample, interleaved, take_turn, wall_ratio
+from evaluation.bench.work import LEAST_ROUNDS, Sample, Work, interleaved, take_turn, wall_ratio
 
 
 def test_a_turn_prepares_each_call_and_times_at_least_one() -> None:
@@ -36,15 +35,15 @@ def test_contenders_alternate_and_the_first_round_is_not_counted() -> None:
 
 
 def test_turns_share_the_time() -> None:
-    told: list[float] = []
+    given: list[float] = []
 
     def take(seconds: float) -> list[Sample]:
-        told.append(seconds)
+        given.append(seconds)
         return [Sample(1.0, 1.0)]
 
     interleaved({0: take, 1: take}, 0.012)
-    assert told[:2] == [0.0, 0.0]
-    assert set(told[2:]) == {0.001}
+    assert given[:2] == [0.0, 0.0]
+    assert set(given[2:]) == {0.001}
 
 
 def test_a_ratio_ignores_load_that_hits_whole_rounds() -> None:

@@ -1,4 +1,4 @@
-"""Times contenders in turns, so that what else the machine does hits all of them alike."""
+"""Work to time, and contenders timed in turns, so that other load hits all of them alike."""
 
 from __future__ import annotations
 
@@ -9,11 +9,28 @@ from typing import TypeVar
 
 import numpy as np
 
-from evaluation.bench.row import Work
+from evaluation.bench.floors import Floor
 
 ROUNDS = 6
-"""Rounds aimed at: each contender has its turn once a round."""
+"""Rounds aimed at: each contender has its turn once per round."""
 LEAST_ROUNDS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Work:
+    """Something to time.
+
+    Attributes:
+        run: One call of it.
+        before: Preparation before each call, which is not timed.
+        size: How large it is, in words.
+        floor: The least that it takes; None where that is unknown.
+    """
+
+    run: Callable[[], object]
+    before: Callable[[], object] = lambda: None
+    size: str = ""
+    floor: Floor | None = None
 
 
 @dataclass(frozen=True)
@@ -21,8 +38,8 @@ class Sample:
     """One call.
 
     Attributes:
-        wall_ms: By the clock.
-        cpu_ms: Of the whole process, all threads together.
+        wall_ms: Time by the clock.
+        cpu_ms: Processor time of the whole process, all threads together.
     """
 
     wall_ms: float
@@ -53,11 +70,11 @@ def interleaved(
     """Let contenders take turns until the time is up, and at least `LEAST_ROUNDS` times.
 
     Args:
-        contenders: Each takes a turn of about the seconds that it is told.
-        seconds: For all of them together; the first turns, which compile, are not counted.
+        contenders: Functions that take a turn of about the given seconds.
+        seconds: Time for all of them together, without the first turns, which compile.
 
     Returns:
-        The turns of each contender, one a round.
+        The turns of each contender, one per round.
     """
     for take in contenders.values():
         take(0.0)
@@ -73,7 +90,7 @@ def interleaved(
 
 
 def wall_ratio(turns: list[Turn], base: list[Turn]) -> float:
-    """How many times as long as the base, in the median over rounds of the rounds' medians."""
+    """Ratio of two contenders' times: the median over rounds of the rounds' medians."""
     ratios = [_median(turn) / _median(other) for turn, other in zip(turns, base, strict=True)]
     return float(np.median(ratios))
 
