@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from airground import __version__
-from evaluation.setup import console
+from evaluation.setup import console, progress
 from evaluation.setup.environment import prepare
 
 if TYPE_CHECKING:
@@ -42,26 +42,31 @@ VERBS = {
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Entry point; ends the process with the verb's exit code."""
-    arguments = list(sys.argv[1:] if arguments is None else arguments)
-    if not arguments or arguments[0] in ("-h", "--help"):
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    sys.exit(console.run(lambda: answer(words), "--verbose" in words))
+
+
+def answer(words: list[str]) -> int | None:
+    """Do what the words ask for; returns the exit code, None for 0."""
+    if not words or words[0] in ("-h", "--help"):
         print(overview())
-        sys.exit(console.EXIT_OK if arguments else console.EXIT_ERROR)
-    if arguments[0] == "--version":
+        return console.EXIT_OK if words else console.EXIT_ERROR
+    if words[0] == "--version":
         print(f"airground {__version__}")
-        sys.exit(console.EXIT_OK)
-    name, *words = arguments
+        return console.EXIT_OK
+    name, *rest = words
     if name not in VERBS:
         console.print_error(f"unknown verb {name!r}; known: {', '.join(VERBS)}")
-        sys.exit(console.EXIT_ERROR)
-    verb = parse(name, words)
-    sys.exit(console.run(lambda: carry_out(verb)))
+        return console.EXIT_ERROR
+    return carry_out(parse(name, rest))
 
 
 def carry_out(verb: Verb) -> int | None:
     """Settle threads, rendering and logging, then do what the verb does."""
     prepare(verb.threads)
     console.start_logging(verb.verbose)
-    return verb.main()
+    with progress.shown():
+        return verb.main()
 
 
 def overview() -> str:

@@ -49,6 +49,7 @@ class Bench(Verb, SensorWord, SeedWord):
         from evaluation.bench.rows import checked_names
         from evaluation.bench.run import run_benchmark
         from evaluation.setup.output import check_free
+        from evaluation.setup.progress import step
 
         names = checked_names([name for name in self.rows.split(",") if name])
         seconds = in_range("--seconds-a-row", self.seconds_a_row, low=0.0, high=3600)
@@ -56,13 +57,13 @@ class Bench(Verb, SensorWord, SeedWord):
             check_free(self.out)
         with (
             tempfile.TemporaryDirectory(prefix="airground-bench-") as scratch,
-            Console(stderr=True).status("starting") as status,
+            step("benchmark") as benchmark,
         ):
             path = self.recording
             if path is None:
-                status.update(f"recording {SCENE}")
+                benchmark.say(f"recording {SCENE}")
                 path = self._record(Path(scratch) / SCENE)
-            report = run_benchmark(path, names, self.workers(), seconds, self.curves, status.update)
+            report = run_benchmark(path, names, self.workers(), seconds, self.curves, benchmark.say)
         self._write(report)
         if self.json:
             print(report.to_json(), end="")

@@ -51,6 +51,7 @@ class Simulate(Verb, SensorWord, SeedWord, OutWord):
 
     def _record_one(self) -> None:
         from evaluation.setup.output import check_free
+        from evaluation.setup.progress import step
         from sim.recording.recorder import record
         from sim.scene import load_scene
         from sim.sensors.presets import sensor_preset
@@ -58,15 +59,17 @@ class Simulate(Verb, SensorWord, SeedWord, OutWord):
         if len(self.scenes) != 1 or self.split or self.jobs != 1:
             raise InputError("several scenes, --split and --jobs: only with --seeds")
         check_free(self.out)
-        record(
-            load_scene(self.scenes[0]),
-            self.checked_seed(),
-            sensor_preset(self.sensors),
-            self.out,
-            self.duration_s,
-            self.workers(),
-            flight=int(in_range("--flight", self.flight)),
-        )
+        with step("rendering", unit="images") as rendering:
+            record(
+                load_scene(self.scenes[0]),
+                self.checked_seed(),
+                sensor_preset(self.sensors),
+                self.out,
+                self.duration_s,
+                self.workers(),
+                flight=int(in_range("--flight", self.flight)),
+                progress=rendering.move_to,
+            )
 
     def _make_dataset(self, seeds: str) -> None:
         from evaluation.datasets.collection import make_dataset

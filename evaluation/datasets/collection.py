@@ -19,14 +19,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from rich.progress import track
-
 from airground.errors import AirgroundError, InputError
 from evaluation.datasets.datasheet import datasheet
 from evaluation.datasets.plan import PLAN, Plan, World
 from evaluation.measure.work.crew import Crew
 from evaluation.setup.checked_json import read_checked
 from evaluation.setup.output import check_free
+from evaluation.setup.progress import step
 from sim.interrupts import end_with_parent
 from sim.recording.recorder import record
 from sim.scene import load_scene
@@ -55,11 +54,16 @@ def make_dataset(plan: Plan, out: Path, jobs: int, threads: int) -> None:
         missing = [w for w in plan.worlds if not (unfinished / w.folder).exists()]
         each = max(1, threads // jobs)
         tasks = [_Making(world, plan, unfinished, each) for world in missing]
-        with TemporaryDirectory() as scratch, Crew(None, jobs, len(tasks), Path(scratch)) as crew:
-            done = crew.outcomes(_make, tasks)
-            for _, refusal in track(done, "recording", total=len(tasks), transient=True):
+        done = len(plan.worlds) - len(missing)
+        with (
+            TemporaryDirectory() as scratch,
+            Crew(None, jobs, len(tasks), Path(scratch)) as crew,
+            step("recording", len(plan.worlds), "worlds", done) as recording,
+        ):
+            for _, refusal in crew.outcomes(_make, tasks):
                 if refusal is not None:
                     raise AirgroundError(refusal)
+                recording.advance()
         recordings = [(world.part, unfinished / world.folder) for world in plan.worlds]
         scenes = [load_scene(scene) for scene in dict.fromkeys(w.scene for w in plan.worlds)]
         sheet = datasheet(out.name, scenes, sensor_preset(plan.sensors), recordings)
@@ -120,7 +124,6 @@ def _make(task: _Making) -> str | None:
             out,
             plan.duration_s,
             task.workers,
-            quiet=True,
         )
     except AirgroundError as error:
         return f"{world.name}, seed {world.seed}: {error}"

@@ -21,6 +21,7 @@ from airground.io.robot_recording import RobotRecording
 from airground.io.tum import write_tum
 from airground.slam.front_end import FrontEnd, TrackedPose
 from evaluation.setup.checked_json import number
+from evaluation.setup.progress import step
 from evaluation.setup.text import percent, seconds
 from evaluation.table.tracked_share import tracked_share_of
 from evaluation.table.trajectory_error import trajectory_error
@@ -50,16 +51,18 @@ def run_alone(recording: RobotRecording, front_end: FrontEnd[Any]) -> AloneResul
     tracked: list[TrackedPose] = []
     frame_ms: list[float] = []
     pending_s = 0.0
-    for stamped in recording.messages():
-        started = time.perf_counter()
-        match stamped.message:
-            case ImuSamples() as samples:
-                front_end.add_imu(samples)
-                pending_s += time.perf_counter() - started
-            case MavImage() | GroundImage() as image:
-                tracked.append(front_end.track(image))
-                frame_ms.append(1e3 * (pending_s + time.perf_counter() - started))
-                pending_s = 0.0
+    with step("tracking", len(recording.camera_stamps), "images") as running:
+        for stamped in recording.messages():
+            started = time.perf_counter()
+            match stamped.message:
+                case ImuSamples() as samples:
+                    front_end.add_imu(samples)
+                    pending_s += time.perf_counter() - started
+                case MavImage() | GroundImage() as image:
+                    tracked.append(front_end.track(image))
+                    frame_ms.append(1e3 * (pending_s + time.perf_counter() - started))
+                    pending_s = 0.0
+                    running.advance()
     started = time.perf_counter()
     front_end.finish()
     finish_ms = 1e3 * (time.perf_counter() - started)

@@ -31,6 +31,7 @@ from evaluation.run.onlooker import Audience, Onlooker, timed
 from evaluation.run.recording import pipeline_rng
 from evaluation.run.tracking import front_end_rng
 from evaluation.setup.checked_json import number
+from evaluation.setup.progress import step
 from evaluation.setup.setups import Setup
 from evaluation.setup.text import percent, seconds
 from evaluation.table.tracked_share import tracked_share_of
@@ -93,17 +94,19 @@ def run_pair(pair: Pair, setup: Setup, seed: int, onlookers: Sequence[Onlooker] 
         warm_up(setup.config, np.random.default_rng(0))
     surfaces = converged = 0
     alignments = []
-    frames = audience.noted(trackers.frames(pair.messages()))
-    for event, duration_ms in timed(pipeline.run(frames)):
-        match event:
-            case SurfaceCast():
-                surfaces += 1
-                sighting = sight(event.surface, pipeline.mapping) if audience else None
-            case BeliefUpdated():
-                converged += event.belief.converged
-            case Aligned():
-                alignments.append(event.alignment)
-        audience.show(event, duration_ms, sighting)
+    images = sum(len(pair.of(robot).camera_stamps) for robot in Source)
+    with step("running", images, "images") as running:
+        frames = running.along(audience.noted(trackers.frames(pair.messages())))
+        for event, duration_ms in timed(pipeline.run(frames)):
+            match event:
+                case SurfaceCast():
+                    surfaces += 1
+                    sighting = sight(event.surface, pipeline.mapping) if audience else None
+                case BeliefUpdated():
+                    converged += event.belief.converged
+                case Aligned():
+                    alignments.append(event.alignment)
+            audience.show(event, duration_ms, sighting)
     pipeline.mapping.correct_ground(trackers.finish())
     tracked = {
         robot: Tracked(ROBOTS[robot], one, one.trajectory(), ROBOTS[robot] in setup.slam_robots())

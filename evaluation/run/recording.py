@@ -12,6 +12,7 @@ import numpy as np
 
 from airground.augmentation import AugmentedMap
 from airground.core.belief import Belief
+from airground.core.cloud import Source
 from airground.core.events import (
     Aligned,
     BeliefUpdated,
@@ -33,6 +34,7 @@ from evaluation.run.tracking import TrackingHere, TrackingTask
 from evaluation.run.tracking_process import TrackingApart
 from evaluation.setup.environment import settle
 from evaluation.setup.memory import peak_memory_mib
+from evaluation.setup.progress import step
 from evaluation.setup.setups import Setup
 from evaluation.table.row_writer import RowWriter
 from evaluation.table.rows import ResultTable
@@ -86,13 +88,17 @@ def run_recording(
     drops = drops or nothing_dropped(recording)
     measure = Measure(recording, truth, setup, seed, onlookers)
     task = TrackingTask(recording, truth, setup, seed, drops)
-    with TrackingApart(task) if apart else nullcontext(TrackingHere(task)) as tracking:
+    images = sum(len(recording.stamps_ns(robot)) for robot in Source)
+    with (
+        TrackingApart(task) if apart else nullcontext(TrackingHere(task)) as tracking,
+        step("running", images, "images") as running,
+    ):
         # Compiling is no part of what is timed.
         warm_up_mapping(setup.config, np.random.default_rng(0))
         settle()
         tracking.wait_until_ready()
         started = time.perf_counter()
-        measure.run(drops.received(tracking.frames()))
+        measure.run(running.along(drops.received(tracking.frames())))
         report = tracking.report()
         # Tracking in processes of its own ends here; what is taken later is taken alone.
         together_mib = peak_memory_mib() + report.peak_memory_mib

@@ -1,19 +1,41 @@
-"""What the user sees of a command: the log, one line for an error, the exit code."""
+"""What a user sees of a command: the log, one line for an error, the exit code.
+
+| exit code | meaning |
+|---|---|
+| 0 | done |
+| 1 | `check` gave the verdict "worse"; nothing else exits with it |
+| 2 | wrong input, or a machine that cannot do it (disk full, out of memory); one line says what |
+| 3 | `doctor` or `inspect` found something wrong in what was looked at |
+| 70 | internal error: a defect of this program; one line names the log file to report |
+| 130 | interrupted by Ctrl-C or terminated |
+"""
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import logging
+import os
 import signal
 import sys
+import tempfile
+import traceback
 from collections.abc import Callable
+from pathlib import Path
 from types import FrameType
 
+from airground import __version__
 from airground.errors import AirgroundError
+from evaluation.setup.progress import stderr
 
 EXIT_OK = 0
+EXIT_WORSE = 1
 EXIT_ERROR = 2
+EXIT_FAULT_FOUND = 3
+EXIT_INTERNAL = 70
+"""EX_SOFTWARE of the BSD header sysexits.h."""
 EXIT_INTERRUPTED = 130
+"""128 + SIGINT, as shells give it."""
 
 
 class Terminated(KeyboardInterrupt):
@@ -22,41 +44,51 @@ class Terminated(KeyboardInterrupt):
 
 def start_logging(verbose: bool) -> None:
     """Send the log to stderr; `verbose` shows what is done at each step."""
-    from rich.console import Console
     from rich.logging import RichHandler
 
-    handler = RichHandler(console=Console(stderr=True), show_path=False, show_time=verbose)
+    handler = RichHandler(console=stderr(), show_path=False, show_time=verbose)
     logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler], force=True)
     level = logging.DEBUG if verbose else logging.INFO
     for room in ("airground", "sim", "evaluation"):
         logging.getLogger(room).setLevel(level)
 
 
-def run(command: Callable[[], int | None]) -> int:
-    """Run a command; what a user can mend becomes one line on stderr and an exit code.
+def run(command: Callable[[], int | None], verbose: bool = False) -> int:
+    """Run a command; an error becomes one line on stderr and an exit code.
 
-    Anything else that escapes is a bug and keeps its traceback.
+    Args:
+        command: Work to be done; returns its exit code, None for 0.
+        verbose: Whether an internal error shows its traceback.
     """
     before = signal.signal(signal.SIGTERM, _terminate)
     try:
-        return command() or EXIT_OK
+        code = command() or EXIT_OK
+        sys.stdout.flush()  # here, where a closed pipe is met
+        return code
     except AirgroundError as error:
         print_error(str(error))
-    except OSError as error:
-        if error.errno is None:
-            raise
-        print_error(describe(error))
+        return EXIT_ERROR
+    except BrokenPipeError:  # the reader of stdout has seen enough
+        _discard_stdout()
+        return EXIT_OK
     except MemoryError:
         print_error("out of memory; a shorter recording or fewer --threads need less")
+        return EXIT_ERROR
     except KeyboardInterrupt as interrupt:
         print_error("terminated" if isinstance(interrupt, Terminated) else "interrupted")
         return EXIT_INTERRUPTED
+    except Exception as error:
+        if isinstance(error, OSError) and error.errno is not None:
+            print_error(describe(error))
+            return EXIT_ERROR
+        _report(error, verbose)
+        return EXIT_INTERNAL
     finally:
         signal.signal(signal.SIGTERM, before)
-    return EXIT_ERROR
 
 
 def print_error(message: str) -> None:
+    """One line on stderr."""
     one_line = " ".join(message.split())
     print(f"airground: error: {one_line}", file=sys.stderr)
 
@@ -65,6 +97,27 @@ def describe(error: OSError) -> str:
     """The file and what is wrong with it."""
     what = "no space left on the disk" if error.errno == errno.ENOSPC else str(error.strerror)
     return f"{error.filename}: {what}" if error.filename is not None else what
+
+
+def _report(error: Exception, verbose: bool) -> None:
+    """Keep the traceback of an internal error in a file, and ask for a report in one line."""
+    trace = "".join(traceback.format_exception(error))
+    if verbose:
+        print(trace, file=sys.stderr, end="")
+    where = "the traceback that --verbose shows"
+    with contextlib.suppress(OSError):
+        descriptor, name = tempfile.mkstemp(prefix="airground-error-", suffix=".log")
+        with os.fdopen(descriptor, "w", encoding="utf-8") as log:
+            log.write(f"airground {__version__}\n{' '.join(sys.argv)}\n\n{trace}")
+        where = str(Path(name))
+    what = traceback.format_exception_only(error)[-1]
+    print_error(f"internal error, please report it with {where}: {what}")
+
+
+def _discard_stdout() -> None:
+    """Keep the interpreter from writing to the closed pipe once more as it ends."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _terminate(_signal: int, _frame: FrameType | None) -> None:

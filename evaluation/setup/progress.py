@@ -1,33 +1,249 @@
-"""How far the work is, and how long it may still take."""
+"""Progress of long work, on stderr: bars on a terminal, else a plain line every ten seconds.
+
+Code that works for long opens a `step` and advances it. Steps are shown only inside `shown`,
+which the command opens: libraries, tests and worker processes stay silent.
+"""
 
 from __future__ import annotations
 
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+import contextlib
+import sys
+import threading
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import TYPE_CHECKING, TypeVar
 
-DAY_S = 24 * 3600.0
+if TYPE_CHECKING:
+    from rich.console import Console
+
+Item = TypeVar("Item")
+
+PLAIN_INTERVAL_S = 10.0
+"""Time between two plain lines [s]; 15 s are promised, and compiling may delay a line."""
+BARS_PER_SECOND = 2
+"""Refresh rate of bars [Hz]: often enough to look alive, without load on what is measured."""
 
 
-def progress_bar(what: str, total: int, done: int = 0) -> Progress:
-    """Shows what is done and the time left; nothing where nobody looks."""
-    console = Console(stderr=True)
-    progress = Progress(
-        TextColumn(what),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        console=console,
-        disable=not console.is_terminal,
-        speed_estimate_period=DAY_S,  # units take minutes
-    )
-    progress.add_task("", total=total, completed=done)
-    return progress
+class Step:
+    """A piece of work whose extent is known.
+
+    Args:
+        what: Name of the work, as in "measuring".
+        total: Extent of the work in `unit`; None if unknown.
+        unit: Unit of `total`, in the plural: "units", "s recorded".
+        done: Extent that is done already.
+        expected_s: Duration to be expected [s]; it gives the time left until there is a rate.
+    """
+
+    def __init__(
+        self,
+        what: str,
+        total: float | None = None,
+        unit: str = "",
+        done: float = 0.0,
+        expected_s: float | None = None,
+    ) -> None:
+        self.what, self.total, self.unit, self.done = what, total, unit, done
+        self.note = ""
+        self._before = done
+        self._expected_s = expected_s
+        self._started = time.monotonic()
+
+    def advance(self, amount: float = 1.0) -> None:
+        """Add to what is done."""
+        self.done += amount
+
+    def move_to(self, done: float, total: float | None = None) -> None:
+        """Set what is done, and the total where it has become known."""
+        self.done = done
+        self.total = self.total if total is None else total
+
+    def along(self, items: Iterable[Item]) -> Iterator[Item]:
+        """Pass items through, and count each once it has been dealt with."""
+        for item in items:
+            yield item
+            self.advance()
+
+    def say(self, note: str) -> None:
+        """Name the part of the work that begins now."""
+        self.note = note
+
+    @property
+    def elapsed_s(self) -> float:
+        """Time since the step began [s]."""
+        return time.monotonic() - self._started
+
+    @property
+    def left_s(self) -> float | None:
+        """Estimate of the time left [s]; None if nothing is known."""
+        gained = self.done - self._before
+        if self.total is not None and gained > 0:
+            return max(0.0, self.elapsed_s / gained * (self.total - self.done))
+        if self._expected_s is not None and self._expected_s > self.elapsed_s:
+            return self._expected_s - self.elapsed_s
+        return None
+
+    def extent(self) -> str:
+        """What is done of how much: "3/8 units"."""
+        if self.total is None:
+            return ""
+        return f"{self.done:.0f}/{self.total:.0f} {self.unit}".rstrip()
+
+    def line(self) -> str:
+        """One plain line: what, how much of it, time elapsed, time left."""
+        left = self.left_s
+        parts = [self.note, self.extent(), f"elapsed {clock(self.elapsed_s)}"]
+        if left is not None:
+            parts.append(f"left about {clock(left)}")
+        return f"{self.what}: {', '.join(part for part in parts if part)}"
+
+
+_open_steps: list[Step] = []
+_display: _Plain | _Bars | None = None
+
+
+@contextmanager
+def step(
+    what: str,
+    total: float | None = None,
+    unit: str = "",
+    done: float = 0.0,
+    expected_s: float | None = None,
+) -> Iterator[Step]:
+    """A step that is shown, inside `shown`, until the block ends; arguments as of `Step`."""
+    opened = Step(what, total, unit, done, expected_s)
+    _open_steps.append(opened)
+    if _display is not None:
+        _display.begin(opened)
+    try:
+        yield opened
+    finally:
+        _open_steps.remove(opened)
+        if _display is not None:
+            _display.end(opened)
+
+
+def announce(what: str, expected_s: float | None = None) -> None:
+    """Say at the start of a command, in one line, what it does and how long that takes.
+
+    Args:
+        what: Work to be done, with its extent.
+        expected_s: Duration to be expected [s]; None if it cannot be known.
+    """
+    if _display is not None:
+        _display.write(what if expected_s is None else f"{what}; takes {roughly(expected_s)}")
+
+
+@contextmanager
+def shown() -> Iterator[None]:
+    """Show every step that is open during the block."""
+    global _display
+    _display = _Bars(stderr()) if stderr().is_terminal else _Plain()
+    try:
+        yield
+    finally:
+        _display.close()
+        _display = None
+
+
+@cache
+def stderr() -> Console:
+    """The console of bars and log, one for both, so that a message does not break a bar."""
+    from rich.console import Console
+
+    return Console(stderr=True)
+
+
+class _Plain:
+    """Writes a line of the innermost open step at fixed intervals."""
+
+    def __init__(self) -> None:
+        self._reported: set[Step] = set()
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._repeat, name="progress", daemon=True)
+        self._thread.start()
+
+    def write(self, line: str) -> None:
+        with contextlib.suppress(OSError, ValueError):  # a reader that has gone ends no work
+            print(line, file=sys.stderr, flush=True)
+
+    def begin(self, step: Step) -> None:
+        pass
+
+    def end(self, step: Step) -> None:
+        if step in self._reported:
+            self._reported.remove(step)
+            self.write(step.line())
+
+    def close(self) -> None:
+        self._over.set()
+        self._thread.join()
+
+    def _repeat(self) -> None:
+        while not self._over.wait(PLAIN_INTERVAL_S):
+            for step in _open_steps[-1:]:
+                self._reported.add(step)
+                self.write(step.line())
+
+
+class _Bars:
+    """Draws a bar for each open step."""
+
+    def __init__(self, console: Console) -> None:
+        from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskID
+        from rich.text import Text
+
+        class StepColumn(ProgressColumn):
+            """The text of the plain line."""
+
+            def render(self, task: Task) -> Text:
+                step: Step = task.fields["step"]
+                task.completed, task.total = step.done, step.total  # for the bar beside it
+                return Text(step.line(), no_wrap=True, overflow="ellipsis")
+
+        self._console = console
+        self._tasks: dict[Step, TaskID] = {}
+        self._bars = Progress(
+            StepColumn(),
+            BarColumn(20),
+            console=console,
+            transient=True,
+            redirect_stdout=False,  # results go to stdout as they are
+            redirect_stderr=False,
+            refresh_per_second=BARS_PER_SECOND,
+        )
+
+    def write(self, line: str) -> None:
+        self._console.print(line, markup=False, highlight=False)
+
+    def begin(self, step: Step) -> None:
+        self._tasks[step] = self._bars.add_task("", total=step.total, step=step)
+        self._bars.start()
+
+    def end(self, step: Step) -> None:
+        self._bars.remove_task(self._tasks.pop(step))
+        if not self._tasks:
+            self._bars.stop()
+
+    def close(self) -> None:
+        self._bars.stop()
+
+
+def clock(seconds: float) -> str:
+    """A duration as 0:07, 12:30 or 3:05:00."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+
+
+def roughly(seconds: float) -> str:
+    """A duration in words, to no more digits than an estimate has."""
+    if seconds < 15:
+        return "some seconds"
+    if seconds < 100:
+        return f"about {round(seconds, -1):.0f} s"
+    if seconds < 100 * 60:
+        return f"about {seconds / 60:.0f} min"
+    return f"about {seconds / 3600:.0f} h"

@@ -7,13 +7,12 @@ import os
 import shutil
 import tempfile
 from collections import defaultdict
+from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from airground.core.messages import ImuSamples, MagneticSamples
 from airground.errors import AirgroundError, InputError
@@ -38,6 +37,9 @@ from sim.world.world import build_world
 FIRST_IMAGE_NS: dict[Robot, int] = {"mav": 50_000_000, "ground": 55_000_000}
 _MARGIN_NS = 20_000_000
 
+Progress = Callable[[int, int], None]
+"""Consumer of progress: frames rendered, frames in all."""
+
 
 def record(
     scene: Scene,
@@ -48,7 +50,7 @@ def record(
     workers: int | None = None,
     *,
     flight: int = 0,
-    quiet: bool = False,
+    progress: Progress | None = None,
 ) -> Path:
     """Record one flight over a scene; the same arguments give the same bytes.
 
@@ -60,7 +62,7 @@ def record(
         duration_s: Cuts the recording short; the scene's own length if None.
         workers: Number of processes that render; one per usable core if None.
         flight: Another flight over the same heap.
-        quiet: No progress bar even on a terminal.
+        progress: Consumer of the rendering's progress.
 
     Returns:
         `out`. On any failure nothing is left behind.
@@ -83,7 +85,7 @@ def record(
             tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".partial", dir=out.parent)
         )
         temporary.chmod(0o755)
-        _fill(temporary, scene, seed, flight, preset, duration_s, workers, quiet)
+        _fill(temporary, scene, seed, flight, preset, duration_s, workers, progress)
         temporary.rename(out)
     except OSError as error:
         if error.errno == errno.ENOSPC:
@@ -103,14 +105,12 @@ def _fill(
     preset: SensorPreset,
     duration_s: float | None,
     workers: int,
-    quiet: bool,
+    progress: Progress | None,
 ) -> None:
     """Write a whole recording into an empty folder."""
-    console = Console(stderr=True, quiet=quiet)
     header, plan = write_all_but_images(root, scene, seed, flight, preset, duration_s)
-    with console.status(f"building {scene.name}"):
-        store_model(plan, scene, seed)
-    digests = _render(plan, workers, console)
+    store_model(plan, scene, seed)
+    digests = _render(plan, workers, progress)
     plan.model.unlink()
     plan.edges.unlink()
     recording_writer.finish(root, header, digests)
@@ -223,22 +223,14 @@ def _header(
     )
 
 
-def _render(plan: FramePlan, workers: int, console: Console) -> dict[str, dict[str, str]]:
+def _render(plan: FramePlan, workers: int, progress: Progress | None) -> dict[str, dict[str, str]]:
     """Make all frames; returns the digests of the images by folder and name."""
     digests: dict[str, dict[str, str]] = defaultdict(dict)
-    columns = (
-        TextColumn("rendering"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("frames,"),
-        TimeRemainingColumn(),
-    )
-    total = sum(len(stamps) for stamps in plan.stamps_ns.values())
-    visible = console.is_terminal and not console.quiet
-    with Progress(*columns, console=console, transient=True, disable=not visible) as progress:
-        task = progress.add_task("", total=total)
-        for files in make_frames(plan, workers):
-            for file in files:
-                digests[file.folder][file.name] = file.digest
-            progress.advance(task, len({(f.name) for f in files}))
+    done, total = 0, sum(len(stamps) for stamps in plan.stamps_ns.values())
+    for files in make_frames(plan, workers):
+        for file in files:
+            digests[file.folder][file.name] = file.digest
+        done += len({file.name for file in files})
+        if progress is not None:
+            progress(done, total)
     return digests

@@ -170,12 +170,42 @@ class TestRun:
         assert cleaned
         assert "interrupted" in one_error_line(capsys) or sent == signal.SIGTERM
 
-    def test_a_bug_keeps_its_traceback(self) -> None:
+    @pytest.mark.parametrize("verbose", [False, True])
+    def test_an_internal_error_keeps_its_traceback(
+        self,
+        verbose: bool,
+        tmp_path: Path,
+        monkeypatch: pytest.MonkeyPatch,
+        capsys: pytest.CaptureFixture[str],
+    ) -> None:
         def fail() -> None:
-            raise ZeroDivisionError
+            raise ZeroDivisionError("by what")
 
-        with pytest.raises(ZeroDivisionError):
-            console.run(fail)
+        monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+        assert console.run(fail, verbose) == console.EXIT_INTERNAL
+        said = capsys.readouterr().err
+        (log,) = tmp_path.iterdir()
+        assert said.splitlines()[-1] == (
+            f"airground: error: internal error, please report it with {log}: "
+            "ZeroDivisionError: by what"
+        )
+        assert ("Traceback" in said) == verbose
+        assert "in fail\n" in log.read_text()
+        assert (
+            len({console.EXIT_OK, console.EXIT_WORSE, console.EXIT_ERROR, console.EXIT_INTERNAL})
+            == 4
+        )
+
+    def test_a_reader_that_has_seen_enough_is_no_error(self) -> None:
+        script = f"import sys; sys.argv[1:] = ['--help']; {RUN_CLI}"
+        with subprocess.Popen(
+            [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        ) as process:
+            assert process.stdout is not None
+            process.stdout.close()
+            assert process.wait() == console.EXIT_OK
+            assert process.stderr is not None
+            assert process.stderr.read() == b""
 
     def test_the_verbs_exit_code_is_kept(self) -> None:
         assert console.run(lambda: 1) == 1

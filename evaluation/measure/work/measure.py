@@ -10,7 +10,7 @@ from evaluation.measure.work.code_version import code_version
 from evaluation.measure.work.crew import Crew
 from evaluation.measure.work.experiment import Outcome, Task, run_task
 from evaluation.measure.work.unit import Finished, Unit, UnitStore, grouped, task_of
-from evaluation.setup.progress import progress_bar
+from evaluation.setup.progress import step
 
 
 @dataclass(frozen=True)
@@ -42,12 +42,13 @@ def measure(units: Sequence[Unit], store: UnitStore, crew: Crew) -> list[Finishe
     groups = grouped(missing.values())
     cores = crew.share(len(groups))
     sent = [Sent(task_of(group, cores), code_version()) for group in groups]
-    with progress_bar("measuring", len(set(keys)), len(set(keys)) - len(missing)) as bar:
+    count = len(set(keys))
+    with step("measuring", count, "units", done=count - len(missing)) as measuring:
         for index, outcome in crew.outcomes(work, sent):
             if isinstance(outcome, Refused):
                 raise InputError(outcome.reason)
             _keep(groups[index], outcome, store)
-            bar.advance(bar.task_ids[0], len(groups[index]))
+            measuring.advance(len(groups[index]))
     return [store.read(key) for key in keys]
 
 

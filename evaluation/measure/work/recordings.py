@@ -9,7 +9,7 @@ from pathlib import Path
 
 from airground.errors import InputError
 from evaluation.measure.work.crew import Crew
-from evaluation.setup.progress import progress_bar
+from evaluation.setup.progress import step
 from sim.recording.recorder import record
 from sim.recording.rendered import Flight
 
@@ -38,12 +38,12 @@ def recorded(flights: Sequence[Flight], folder: Path, crew: Crew) -> list[Path]:
             log.info("using the recording %s", path)
     folder.mkdir(parents=True, exist_ok=True)
     cores = crew.share(len(missing))
-    with progress_bar("recording", len(missing)) as bar:
+    with step("recording", len(missing), "flights") as recording:
         tasks = [ToRecord(flight, path, cores) for flight, path in missing]
         for _, refusal in crew.outcomes(record_flight, tasks):
             if refusal is not None:
                 raise InputError(refusal)
-            bar.advance(bar.task_ids[0])
+            recording.advance()
     for path in paths:
         if not path.exists():
             raise InputError(f"{path}: workers elsewhere record to another disk; give --render")
@@ -64,7 +64,6 @@ def record_flight(task: ToRecord) -> str | None:
             flight.duration_s,
             workers=task.workers,
             flight=flight.flight,
-            quiet=True,
         )
     except InputError as error:
         return str(error)

@@ -24,6 +24,7 @@ from evaluation.run.onlooker import timed
 from evaluation.run.recording import Measure, RunResult
 from evaluation.setup.environment import settle
 from evaluation.setup.memory import peak_memory_mib
+from evaluation.setup.progress import step
 from evaluation.setup.setups import Setup
 from evaluation.table.tracking_log import FrontEndLog, Tracked
 from sim.recording.truth import Truth
@@ -54,7 +55,8 @@ def run_live(
         AirgroundError: A robot's process refused its task, or could not go on.
     """
     measure = Measure(recording, truth, setup, seed)
-    with ExitStack() as stack:
+    images = sum(len(recording.stamps_ns(robot)) for robot in Source)
+    with ExitStack() as stack, step("playing", images, "images") as playing:
         robots = [
             _start(recording, robot, setup, seed, playback, stack)
             for robot in (Source.GROUND, Source.MAV)
@@ -71,7 +73,8 @@ def run_live(
         patience_s = playback.patience_s
         if playback.radio is not None:
             patience_s += playback.radio.latency_ms * 1e-3
-        _map(measure, in_order(streams, lived.clock, patience_s), lived)
+        frames = in_order(streams, lived.clock, patience_s)
+        _map(measure, playing.along(frames), lived)
         for robot in robots:
             lived.reports[robot.robot] = robot.report()
             lived.late_ns[robot.robot] = robot.stream.late_ns
