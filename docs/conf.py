@@ -6,7 +6,7 @@ from sphinx.application import Sphinx
 from airground import __version__
 from evaluation.setup.environment import prepare
 
-prepare()  # Modules are imported for their docstrings; MuJoCo wants to know how to render.
+prepare()  # Modules are imported for their docstrings; MuJoCo needs a way to render first.
 
 project = "airground"
 author = "the airground authors"
@@ -36,22 +36,29 @@ napoleon_attr_annotations = False  # Docstrings state shapes and units, which ty
 
 
 def setup(app: Sphinx) -> None:
-    """Hook in where docstrings and signatures would be misread."""
+    """Register the corrections of docstrings and signatures below."""
     app.connect("autodoc-process-docstring", keep_colons, priority=400)  # napoleon's is 500
+    app.connect("autodoc-process-docstring", keep_bars)
     app.connect("autodoc-process-signature", without_constraints)
 
 
 def keep_colons(app: Sphinx, what: str, name: str, obj: object, options: dict, lines: list) -> None:
-    """Napoleon takes what stands before a colon under a constant for its type: an empty comment
-    as first line has none.
+    """Start a constant's docstring with an empty comment.
+
+    Napoleon takes the text before a colon in its first line for a type.
     """
     if what in ("attribute", "data", "property") and lines:
         lines[:0] = ["..", ""]
 
 
+def keep_bars(app: Sphinx, what: str, name: str, obj: object, options: dict, lines: list) -> None:
+    """Escape vertical bars: docutils takes `|x|` for a substitution."""
+    lines[:] = [line.replace("|", r"\|") for line in lines]
+
+
 def without_constraints(
     app: Sphinx, what: str, name: str, obj: object, options: dict, *signature: str | None
 ) -> tuple[str, None] | None:
-    """A pydantic model's signature spells out every constraint; its fields are listed below it."""
+    """Drop a pydantic model's signature, which repeats its fields with every constraint."""
     is_model = isinstance(obj, type) and issubclass(obj, BaseModel)
     return ("", None) if is_model else None

@@ -22,7 +22,9 @@ from evaluation.table.rows import ResultTable
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 SECTIONS = {name: getattr(Config(), name) for name in Config.model_fields}
-PARAMETER = re.compile(rf"\b({'|'.join(n for n in SECTIONS if n != 'preset')})\.(\w+)")
+PARAMETER = re.compile(
+    rf"(?<!airground\.)\b({'|'.join(n for n in SECTIONS if n != 'preset')})\.(\w+)"
+)
 
 
 @pytest.fixture(params=PAGES, ids=[page.name for page in PAGES])
