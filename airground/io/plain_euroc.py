@@ -1,33 +1,42 @@
-"""Plain EuRoC/ASL folders, as ETH Zurich and those who follow them ship them.
+"""Plain EuRoC/ASL folders, as ETH Zurich and others publish them.
 
     mav0/cam0/{sensor.yaml,data.csv,data/*.png}    one grey camera
     mav0/imu0/{sensor.yaml,data.csv}               may be missing
     mav0/mag0/data.csv                             may be missing
 
-The body of `T_BS` is in general not level, so that a body with z up is made from gravity.
+The body of `T_BS` is in general not level: gravity defines a body whose z axis points up.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airground.core.cloud import Source
-from airground.core.messages import MavImage, RobotCalibration
+from airground.core.messages import ImuNoise, ImuSamples, MavImage, RobotCalibration
 from airground.core.se3 import SE3
 from airground.errors import RecordingError
-from airground.io.euroc import read_image_list, read_magnetic
+from airground.io.euroc import read_image_list, read_imu, read_magnetic
+from airground.io.image_files import listed_files
 from airground.io.images import read_grey
 from airground.io.lens import Undistortion
-from airground.io.listed_files import listed_files
-from airground.io.plain_inertial import read_inertial
-from airground.io.plausibility import CAMERA_STEP_S, check_stamp_unit, level_body
+from airground.io.plausibility import (
+    CAMERA_STEP_S,
+    IMU_STEP_S,
+    check_imu_covers,
+    check_stamp_unit,
+    check_up_in_camera,
+    level_body,
+    upwards,
+)
 from airground.io.robot_recording import RobotRecording
-from airground.io.sensor_file import read_lens, read_pose
+from airground.io.sensor_file import read_imu_noise, read_lens, read_pose
 
 UP_LEVEL_CAMERA = np.array([0.0, -1.0, 0.0])
-"""What is up in a camera that looks straight ahead; assumed where nothing measures it."""
+"""Up in a camera that looks straight ahead; assumed where no sensor measures it."""
 
 
 def euroc_folder(path: Path) -> Path | None:
@@ -35,7 +44,7 @@ def euroc_folder(path: Path) -> Path | None:
     return next((folder for folder in (path / "mav0", path) if (folder / "cam0").is_dir()), None)
 
 
-def open_euroc(path: Path, calibration_file: Path | None = None) -> RobotRecording:
+def open_euroc(path: Path, calibration_file: Path | None = None) -> RobotRecording[MavImage]:
     """Open a folder of one grey camera and perhaps an IMU, and check all but its images.
 
     Args:
@@ -88,3 +97,50 @@ def open_euroc(path: Path, calibration_file: Path | None = None) -> RobotRecordi
         pose_frame="body",
         T_pose_camera=T_body_camera,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Inertial:
+    """An IMU beside a camera.
+
+    Attributes:
+        samples: All samples.
+        noise: Noise densities from `sensor.yaml`.
+        T_imu_camera: Pose of the camera in the IMU's frame.
+        up_imu: (3,) unit vector against gravity in the IMU's frame at the first samples.
+    """
+
+    samples: ImuSamples
+    noise: ImuNoise
+    T_imu_camera: SE3
+    up_imu: NDArray[np.float64]
+
+
+def read_inertial(
+    folder: Path, T_body_camera: SE3, camera_stamps_ns: NDArray[np.int64]
+) -> Inertial:
+    """Read `imu0`, and check that it fits the images.
+
+    Args:
+        folder: The folder `imu0`.
+        T_body_camera: Pose of the camera in the body of `T_BS`.
+        camera_stamps_ns: (N,) stamps of the images [ns].
+
+    Raises:
+        RecordingError: One line that names file, key or stamp and what would be right.
+    """
+    imu_file, sensor_file = folder / "data.csv", folder / "sensor.yaml"
+    T_imu_camera = _in_imu(read_pose(sensor_file), T_body_camera)
+    samples = read_imu(imu_file)
+    check_stamp_unit(samples.stamps_ns, imu_file, "nanoseconds", IMU_STEP_S)
+    check_imu_covers(samples, imu_file, camera_stamps_ns)
+    up_imu = upwards(samples, imu_file)
+    check_up_in_camera(T_imu_camera.rotation.T @ up_imu, imu_file)
+    return Inertial(samples, read_imu_noise(sensor_file), T_imu_camera, up_imu)
+
+
+def _in_imu(T_body_imu: SE3, T_body_camera: SE3) -> SE3:
+    """Pose of the camera in the IMU's frame; unchanged to the last bit if the body is the IMU."""
+    if (T_body_imu.matrix() == np.eye(4)).all():
+        return T_body_camera
+    return T_body_imu.inverse() @ T_body_camera

@@ -1,19 +1,20 @@
-"""Plain TUM RGB-D folders, as TU Munich and those who follow them ship them.
+"""Plain TUM RGB-D folders, as TU Munich and others publish them.
 
     rgb.txt  rgb/*.png        colour, 8 bit
-    depth.txt  depth/*.png    16 bit, 5000 a metre, 0 is missing, registered to the colour
+    depth.txt  depth/*.png    16 bit, 5000 per metre, 0 is missing, registered to the colour
     accelerometer.txt         of a Kinect; may be missing
     imu0/{sensor.yaml,data.csv} mag0/data.csv    in EuRoC's form; TUM's own have none
 
-No calibration is shipped: it is the published one of the Kinect that the folder's name
-tells, or comes from a file. Without a gyro a recording has no IMU; the accelerometer then
-only says what is up as the recording starts.
+The folders have no calibration: the published one of the Kinect in the folder's name is used,
+or a file. Without a gyro a recording has no IMU; the accelerometer then gives only the
+direction of gravity at the start.
 """
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -23,19 +24,20 @@ from airground.core.cloud import Source
 from airground.core.messages import GroundImage, MavImage, RobotCalibration
 from airground.core.se3 import SE3
 from airground.errors import RecordingError
-from airground.io.associate import associate
 from airground.io.euroc import read_lines, read_magnetic
+from airground.io.image_files import listed_files
 from airground.io.images import image_size, read_colour, read_depth
 from airground.io.lens import Lens, Undistortion
-from airground.io.listed_files import listed_files
-from airground.io.plain_inertial import Inertial, read_inertial
+from airground.io.plain_euroc import UP_LEVEL_CAMERA, Inertial, read_inertial
 from airground.io.plausibility import CAMERA_STEP_S, check_stamp_unit, level_body
 from airground.io.robot_recording import RobotRecording
 from airground.io.sensor_file import read_lens, read_pose
 from airground.io.tum import parse_stamp, read_image_list
 
 DEPTH_UNITS_PER_M = 5000.0
+"""PNG value of one metre of depth, by the format's definition."""
 MAX_DIFFERENCE_NS = 20_000_000
+"""Largest difference between the stamps of colour and depth [ns], as in TUM's `associate.py`."""
 CALIBRATION_NAMES = ("calibration.yaml", "sensor.yaml", "calibration.toml")
 LISTS = ("rgb.txt", "depth.txt", "accelerometer.txt")
 
@@ -51,27 +53,58 @@ PUBLISHED = {
 """The colour cameras as the data set's authors calibrated them."""
 
 ACCELEROMETER_AXES = np.array([-1.0, -1.0, 1.0])
-"""A Kinect's accelerometer counts left and up positive: times this it is in camera axes."""
+"""Factors from a Kinect's accelerometer (left and up positive) to the camera's axes."""
 START_S = 0.1
-UP_LEVEL_CAMERA = np.array([0.0, -1.0, 0.0])
-"""What is up in a camera that looks straight ahead; assumed where nothing measures it."""
+"""Accelerometer readings this close to the first image give the direction of gravity [s]."""
+
+
+def associate(
+    first_ns: NDArray[np.int64], second_ns: NDArray[np.int64], max_difference_ns: int
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Pair stamps one to one, the nearest pairs first (as TUM's `associate.py` does).
+
+    Args:
+        first_ns, second_ns: (N,) and (M,) stamps [ns], strictly increasing.
+        max_difference_ns: Largest difference within a pair [ns].
+
+    Returns:
+        (P,) indices into each, in order of time.
+    """
+    low = np.searchsorted(second_ns, first_ns - max_difference_ns, side="left")
+    high = np.searchsorted(second_ns, first_ns + max_difference_ns, side="right")
+    counts = high - low
+    i = np.repeat(np.arange(len(first_ns)), counts)
+    # Within each run of equal i, j counts up from its low.
+    j = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    j += np.repeat(low, counts)
+    taken_i, taken_j = np.zeros(len(first_ns), bool), np.zeros(len(second_ns), bool)
+    pairs = []
+    for k in np.lexsort((j, i, np.abs(first_ns[i] - second_ns[j]))):
+        if not (taken_i[i[k]] or taken_j[j[k]]):
+            taken_i[i[k]] = taken_j[j[k]] = True
+            pairs.append((i[k], j[k]))
+    pairs.sort()
+    table = np.array(pairs, np.int64).reshape(-1, 2)
+    return table[:, 0], table[:, 1]
 
 
 def is_tum_folder(path: Path) -> bool:
     return (path / "rgb.txt").is_file()
 
 
-def open_tum(path: Path, robot: Source, calibration_file: Path | None = None) -> RobotRecording:
+def open_tum(
+    path: Path, robot: Source, calibration_file: Path | None = None
+) -> RobotRecording[Any]:
     """Open a folder of colour and depth images and check all but the images.
 
     Colour and depth are paired by their stamps, one to one, nearest first, at most 20 ms
-    apart; a frame has the stamp of its colour image. What finds no partner is left out.
+    apart; a frame has the stamp of its colour image. Images without a partner are left out.
 
     Args:
         path: The folder with `rgb.txt`.
-        robot: Whom to take it for. The MAV's images are grey and without depth; where there
-            is no gyro either, the scale of its map is unknown.
-        calibration_file: Of the colour camera, in the form of EuRoC's `sensor.yaml`.
+        robot: Robot that the folder stands for. The MAV's images are grey and without depth;
+            without a gyro the scale of its map is unknown.
+        calibration_file: Calibration of the colour camera, in the form of EuRoC's `sensor.yaml`.
 
     Raises:
         RecordingError: One line that names file, key or stamp and what would be right.
@@ -114,6 +147,7 @@ def open_tum(path: Path, robot: Source, calibration_file: Path | None = None) ->
     T_imu_camera = inertial.T_imu_camera if inertial else SE3.identity()
     up_imu = inertial.up_imu if inertial else _up_at_start(path, int(stamps[0]))
     magnetic_file = path / "mag0" / "data.csv"
+    read: Any = read_grey_image if robot == Source.MAV else read_image
     return RobotRecording(
         path=path,
         layout="tum",
@@ -127,7 +161,7 @@ def open_tum(path: Path, robot: Source, calibration_file: Path | None = None) ->
         camera_stamps=stamps,
         imu=inertial.samples if inertial else None,
         magnetic=read_magnetic(magnetic_file) if magnetic_file.exists() else None,
-        read_image=read_grey_image if robot == Source.MAV else read_image,
+        read_image=read,
         pose_frame="camera",
         T_pose_camera=SE3.identity(),
     )
@@ -136,7 +170,7 @@ def open_tum(path: Path, robot: Source, calibration_file: Path | None = None) ->
 def _inertial(
     path: Path, calibration_file: Path | None, stamps: NDArray[np.int64]
 ) -> Inertial | None:
-    """The IMU of a folder that has one, whose place the camera's calibration tells."""
+    """The IMU of a folder that has one; the camera's calibration gives its pose."""
     if not (path / "imu0").exists():
         return None
     if calibration_file is None:
@@ -148,13 +182,13 @@ def _inertial(
 
 
 def _calibration_file(path: Path, given: Path | None) -> Path | None:
-    """The file that the user names, or one beside the images."""
+    """The file that the user gave, or one beside the images."""
     candidates = [path / name for name in CALIBRATION_NAMES]
     return given or next((f for f in candidates if f.is_file()), None)
 
 
 def _published_lens(path: Path) -> Lens:
-    # The name of the recording stands in the folder's name, and in comments of the lists.
+    # The folder's name contains the recording's name, and so do comments of the lists.
     comments = [
         line
         for name in LISTS
@@ -190,7 +224,7 @@ def _check_same_size(depth_file: Path, colour: NDArray[np.uint8]) -> None:
 
 
 def _up_at_start(path: Path, stamp_ns: int) -> NDArray[np.float64]:
-    """(3,) unit vector, up in the camera as the first image was taken."""
+    """(3,) unit vector against gravity in the camera at the first image."""
     file = path / "accelerometer.txt"
     if not file.is_file():
         return UP_LEVEL_CAMERA

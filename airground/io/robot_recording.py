@@ -1,10 +1,15 @@
-"""What one robot alone sensed, whoever recorded it."""
+"""What one robot sensed, and what two robots sensed together, whatever the layout on disk."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import heapq
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from operator import itemgetter
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,24 +25,61 @@ from airground.core.messages import (
     Stamped,
 )
 from airground.core.se3 import SE3
-from airground.io.message_order import bundles
+from airground.core.work_ahead import read_ahead
+from airground.errors import RecordingError
+
+NOTHING: Mapping[Source, Collection[int]] = MappingProxyType({})
+BOTH = (Source.GROUND, Source.MAV)
+"""Both robots; where stamps are equal, the ground robot's messages come first."""
+
+Image = TypeVar("Image", MavImage, GroundImage)
+
+
+@dataclass
+class Bundler:
+    """Puts the samples since the previous image before each image.
+
+    A bundle has at most one message of inertial and one of magnetic samples. The samples of an
+    image that is left out go into the bundle of the next one.
+
+    Attributes:
+        robot: The robot that sends the messages.
+        imu, magnetic: All samples of its sensors; None without such a sensor.
+    """
+
+    robot: Source
+    imu: ImuSamples | None
+    magnetic: MagneticSamples | None
+    _previous_ns: int = np.iinfo(np.int64).min
+
+    def bundle(self, image: MavImage | GroundImage) -> list[Stamped]:
+        """The messages that end with this image."""
+        bundle = []
+        for sensor in (self.imu, self.magnetic):
+            if sensor is not None:
+                samples = sensor.between(self._previous_ns, image.stamp_ns)
+                if len(samples.stamps_ns):
+                    bundle.append(Stamped(self.robot, samples))
+        bundle.append(Stamped(self.robot, image))
+        self._previous_ns = image.stamp_ns
+        return bundle
 
 
 @dataclass(frozen=True, eq=False)
-class RobotRecording:
+class RobotRecording(Generic[Image]):
     """One robot's messages, with images of a pinhole camera.
 
     Attributes:
         path: The folder.
         layout: "airground", "euroc" or "tum".
-        robot: Who recorded it, or is to be taken for it.
-        calibration: What the front end is told.
-        camera_stamps: (N,) int64 of the images [ns].
-        imu: All inertial samples; None where there is no gyro.
-        magnetic: All magnetometer samples; None where there are none.
-        read_image: The image at an index in `camera_stamps`.
-        pose_frame: Whose pose the folder's publisher states: "body", "imu" or "camera".
-        T_pose_camera: The camera in that frame, so that trajectories can be written of it.
+        robot: The robot that recorded it, or whose place it takes.
+        calibration: The nominal calibration, as front ends use it.
+        camera_stamps: (N,) int64 stamps of the images [ns].
+        imu: All inertial samples; None without a gyro.
+        magnetic: All magnetometer samples; None without a magnetometer.
+        read_image: Reads the image at an index of `camera_stamps`.
+        pose_frame: Frame whose poses the publisher states as truth: "body", "imu" or "camera".
+        T_pose_camera: Pose of the camera in that frame, to write comparable trajectories.
     """
 
     path: Path
@@ -47,7 +89,7 @@ class RobotRecording:
     camera_stamps: NDArray[np.int64]
     imu: ImuSamples | None
     magnetic: MagneticSamples | None
-    read_image: Callable[[int], MavImage] | Callable[[int], GroundImage]
+    read_image: Callable[[int], Image]
     pose_frame: str
     T_pose_camera: SE3
 
@@ -57,8 +99,19 @@ class RobotRecording:
 
     @property
     def duration_s(self) -> float:
-        """From the first image to the last [s]."""
+        """Time from the first image to the last [s]."""
         return float(self.camera_stamps[-1] - self.camera_stamps[0]) / 1e9
+
+    def image_at(self, stamp_ns: int) -> Image:
+        """The image with this stamp; ValueError if there is none."""
+        index = int(np.searchsorted(self.camera_stamps, stamp_ns))
+        if index == len(self.camera_stamps) or self.camera_stamps[index] != stamp_ns:
+            raise ValueError(f"no image has the stamp {stamp_ns}")
+        return self.read_image(index)
+
+    def bundler(self) -> Bundler:
+        """Puts this robot's samples before its images."""
+        return Bundler(self.robot, self.imu, self.magnetic)
 
     def messages(self) -> Iterator[Stamped]:
         """Every message in order of time; samples come before the image that they precede.
@@ -66,10 +119,73 @@ class RobotRecording:
         Raises:
             RecordingError: An image cannot be read or does not fit the calibration.
         """
-        for _, bundle in self.bundles():
-            yield from bundle
+        bundler = self.bundler()
+        for index in range(len(self.camera_stamps)):
+            yield from bundler.bundle(self.read_image(index))
 
-    def bundles(self) -> Iterator[tuple[int, list[Stamped]]]:
-        """Each image's stamp, and the image after the samples since the one before it."""
-        images = (self.read_image(index) for index in range(len(self.camera_stamps)))
-        return bundles(self.robot, images, self.imu, self.magnetic)
+    def bundles(
+        self, pool: ThreadPoolExecutor, dropped: Collection[int] = ()
+    ) -> Iterator[tuple[int, list[Stamped]]]:
+        """Each image's stamp, and the image after the samples since the one before it.
+
+        Args:
+            pool: Reads images ahead.
+            dropped: Stamps [ns] of images to leave out.
+        """
+        bundler = self.bundler()
+        stamps = self.camera_stamps.tolist()
+        kept = [index for index, stamp in enumerate(stamps) if stamp not in dropped]
+        for image in read_ahead(pool, self.read_image, kept):
+            yield image.stamp_ns, bundler.bundle(image)
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """What a MAV and a ground robot sensed, stamped by the same clock.
+
+    Attributes:
+        mav, ground: Recording of each robot.
+
+    Raises:
+        RecordingError: The ground robot begins after the MAV has ended, so that there is no
+            map to locate the MAV in.
+    """
+
+    mav: RobotRecording[MavImage]
+    ground: RobotRecording[GroundImage]
+
+    def __post_init__(self) -> None:
+        assert (self.mav.robot, self.ground.robot) == (Source.MAV, Source.GROUND)
+        late_ns = int(self.ground.camera_stamps[0] - self.mav.camera_stamps[-1])
+        if late_ns > 0:
+            raise RecordingError(
+                f"{self.ground.path}: begins {late_ns / 1e9:.1f} s after {self.mav.path} ended; "
+                "both must be stamped by the same clock, and the ground robot must come first"
+            )
+
+    def of(self, robot: Source) -> RobotRecording[Any]:
+        """The recording of one robot."""
+        return self.mav if robot == Source.MAV else self.ground
+
+    def messages(
+        self,
+        dropped: Mapping[Source, Collection[int]] = NOTHING,
+        robots: Sequence[Source] = BOTH,
+    ) -> Iterator[Stamped]:
+        """Every message in order of time.
+
+        Before each image come the inertial and magnetic samples since the previous image
+        of the same robot, one message each unless there are none.
+
+        Args:
+            dropped: Stamps [ns] of images to leave out, as a busy robot would; their samples
+                come before the next image.
+            robots: Robots whose messages are wanted; at equal stamps the first one's come first.
+
+        Raises:
+            RecordingError: An image cannot be read or does not fit the calibration.
+        """
+        with ThreadPoolExecutor(1) as pool:
+            streams = [self.of(robot).bundles(pool, dropped.get(robot, ())) for robot in robots]
+            for _, bundle in heapq.merge(*streams, key=itemgetter(0)):
+                yield from bundle

@@ -279,14 +279,14 @@ def ground_surface(material: Material) -> Work:
 def read_grey(material: Material) -> Work:
     recording = material.recording
     camera = material.mav_camera
-    read = _in_turn(recording.read_mav_image, len(recording.mav_camera_stamps))
+    read = _in_turn(recording.mav.read_image, len(recording.mav.camera_stamps))
     return Work(read, size=f"{camera.width} x {camera.height} px, grey PNG")
 
 
 def read_colour_depth(material: Material) -> Work:
     recording = material.recording
     camera = material.ground_camera
-    read = _in_turn(recording.read_ground_image, len(recording.ground_camera_stamps))
+    read = _in_turn(recording.ground.read_image, len(recording.ground.camera_stamps))
     return Work(read, size=f"{camera.width} x {camera.height} px, colour and depth PNG")
 
 

@@ -133,7 +133,9 @@ def play(
     """
     with AddedMemory() as added:
         task = TrackingTask(recording, None, Setup(config), 0, nothing_dropped(recording))
-        pipeline = Pipeline(config, recording.mav, recording.ground, pipeline_rng(0))
+        pipeline = Pipeline(
+            config, recording.mav.calibration, recording.ground.calibration, pipeline_rng(0)
+        )
         gathering = _Gathering(recording, config, pipeline)
         with TrackingApart(task) as tracking:
             memory = MemoryLog(recording, tracking.pids)
@@ -172,7 +174,7 @@ class MemoryLog:
 
     def __init__(self, recording: Recording, tracking: Sequence[int]) -> None:
         self._processes = (os.getpid(), *tracking)
-        stamps_ns = recording.stamps_ns(Source.GROUND)
+        stamps_ns = recording.of(Source.GROUND).camera_stamps
         first_ns, last_ns = int(stamps_ns[0]), int(stamps_ns[-1])
         ends_ns = np.linspace(first_ns, last_ns, PARTS + 1)[1:]
         self._waiting_ns = [int(end_ns) for end_ns in ends_ns]
@@ -240,14 +242,14 @@ class _Gathering:
         return Material(
             self.recording,
             self.config,
-            self.recording.mav.camera,
-            self.recording.ground.camera,
+            self.recording.mav.calibration.camera,
+            self.recording.ground.calibration.camera,
             depth_maps,
             self._posed(reference_ns),
             [self._posed(stamp_ns) for stamp_ns in sorted(self._views[reference_ns])],
             sighting,
             T_ground_mav,
-            self.recording.ground_image_at(sighting.ground_stamp_ns),
+            self.recording.ground.image_at(sighting.ground_stamp_ns),
             self._ground_field(),
         )
 
@@ -257,5 +259,5 @@ class _Gathering:
         return ground_map.field().copy()
 
     def _posed(self, stamp_ns: int) -> PosedImage:
-        image = self.recording.mav_image_at(stamp_ns).image
+        image = self.recording.mav.image_at(stamp_ns).image
         return PosedImage(stamp_ns, image, self._poses[stamp_ns])

@@ -50,7 +50,7 @@ class AloneWords:
         import numpy as np
 
         from airground.core.cloud import Source
-        from airground.io.open_robot import open_robot
+        from airground.io.open_recording import open_robot
         from airground.slam import front_ends
         from evaluation.run.alone import print_alone, run_alone, write_alone
         from evaluation.setup.output import fresh_folder

@@ -85,8 +85,8 @@ class OwnWords:
     def run_own(self, out: Path, setup: Setup, seed: int, watching: Watching) -> None:
         """Run both folders, write what came out, and print a summary."""
         from airground.core.cloud import Source
-        from airground.io.open_robot import open_robot
-        from airground.io.pair import Pair
+        from airground.io.open_recording import open_robot
+        from airground.io.robot_recording import Pair
         from evaluation.run.pair import print_pair, run_pair, write_pair
         from evaluation.setup.output import fresh_folder
         from evaluation.setup.settings import write_config

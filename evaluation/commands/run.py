@@ -81,7 +81,7 @@ class Run(Verb, OwnWords, AloneWords, RealtimeWords, LookWords, SetupWords, Seed
             recording = Recording.open(path)
             truth = Truth.open(recording.path)
             closeup = CloseUp(recording, truth, setup) if self.looks else None
-            calibrations = {robot: recording.calibration(robot) for robot in Source}
+            calibrations = {robot: recording.of(robot).calibration for robot in Source}
             with self.watching(folder, recording.path.name, calibrations, truth) as onlookers:
                 if closeup is not None:
                     onlookers.append(closeup)

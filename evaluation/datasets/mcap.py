@@ -127,7 +127,7 @@ def _images(simulated: Simulated, robot: Robot) -> Iterator[Message]:
         image = ros.compressed_image(stamp, frame, files[index])
         yield stamp, f"{topic}/image_raw/compressed", image
         if robot == "ground":
-            depth = simulated.recording.read_ground_image(index).depth
+            depth = simulated.recording.ground.read_image(index).depth
             yield stamp, f"{topic}/depth", ros.depth_image(stamp, frame, depth)
         T_world_camera = simulated.truth.T_world_camera(robot, stamp)
         yield stamp, f"/{robot}/truth/camera", ros.pose(stamp, WORLD, T_world_camera)

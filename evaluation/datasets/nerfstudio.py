@@ -77,6 +77,6 @@ def _frame(view: View) -> dict[str, Any]:
 
 
 def _write_depth(path: Path, simulated: Simulated, view: View) -> None:
-    depth_mm = np.nan_to_num(simulated.recording.read_ground_image(view.index).depth) * MM_PER_M
+    depth_mm = np.nan_to_num(simulated.recording.ground.read_image(view.index).depth) * MM_PER_M
     if not cv2.imwrite(str(path), np.rint(depth_mm).astype(np.uint16)):
         raise OSError(f"{path}: cannot be written")

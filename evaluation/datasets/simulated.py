@@ -12,9 +12,10 @@ from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.errors import InputError
 from airground.io.calibration import RobotTable
-from airground.io.image_source import ImageFiles
+from airground.io.image_files import ImageFiles
 from airground.io.layout import HEADER
 from airground.io.recording import Recording
+from airground.io.robot_recording import RobotRecording
 from sim.recording.truth import Truth
 from sim.robots.motion import Robot
 from sim.robots.robot_motion import RobotMotion
@@ -62,9 +63,10 @@ class Simulated:
 
     def stamps_ns(self, robot: Robot) -> list[int]:
         """Of the robot's images."""
-        recording = self.recording
-        stamps = recording.mav_camera_stamps if robot == "mav" else recording.ground_camera_stamps
-        return stamps.tolist()
+        return self._sensed(robot).camera_stamps.tolist()
+
+    def _sensed(self, robot: Robot) -> RobotRecording:
+        return self.recording.mav if robot == "mav" else self.recording.ground
 
     def image_files(self, robot: Robot) -> Sequence[Path]:
         """Of the robot's camera, grey or colour, in order of time."""
@@ -72,9 +74,10 @@ class Simulated:
 
     def samples(self, robot: Robot) -> tuple[ImuSamples, MagneticSamples]:
         """What the robot's IMU and magnetometer measured."""
-        if robot == "mav":
-            return self.recording.mav_imu, self.recording.mav_magnetic
-        return self.recording.ground_imu, self.recording.ground_magnetic
+        sensed = self._sensed(robot)
+        assert sensed.imu is not None
+        assert sensed.magnetic is not None
+        return sensed.imu, sensed.magnetic
 
     def true_cameras(self, robot: Robot) -> Trajectory:
         """`T_world_camera` of every image, by the stamps that the images bear."""

@@ -83,5 +83,5 @@ def choose_views(simulated: Simulated, robots: tuple[Robot, ...]) -> Views:
 
 def _image(simulated: Simulated, robot: Robot, index: int) -> np.ndarray:
     if robot == "mav":
-        return simulated.recording.read_mav_image(index).image
-    return simulated.recording.read_ground_image(index).colour
+        return simulated.recording.mav.read_image(index).image
+    return simulated.recording.ground.read_image(index).colour

@@ -110,8 +110,8 @@ class CloseUp:
             aerial_cloud=_part(cloud, sources == Source.MAV),
             mav_path=_path(tracked["mav"], T_ground_mav),
             ground_path=_path(tracked["ground"], SE3.identity()),
-            mav_image=self._recording.mav_image_at(surface.reference_stamp_ns).image,
-            ground_image=self._recording.ground_image_at(sighting.ground_stamp_ns).colour,
+            mav_image=self._recording.mav.image_at(surface.reference_stamp_ns).image,
+            ground_image=self._recording.ground.image_at(sighting.ground_stamp_ns).colour,
             T_ground_mav=self._refined(sighting),
         )
         if match_seed is None:
@@ -201,7 +201,7 @@ def make_showcase(
         return None
     close_up = CloseUp(recording, truth, setup)
     rng = np.random.default_rng([seed, 3])
-    pipeline = Pipeline(setup.config, recording.mav, recording.ground, rng)
+    pipeline = Pipeline(setup.config, recording.mav.calibration, recording.ground.calibration, rng)
     for sighting, fused in zip(maps.sightings[:SEQUENCE_LENGTH], maps.depth_maps, strict=False):
         surface = sighting.surface
         events: list[Event] = [DepthMapMade(surface.stamp_ns, made) for made in fused]

@@ -70,12 +70,12 @@ def front_ends_for(
     if oracles and way["mav"] == "oracle":
         mav = oracles.mav
     else:
-        needs = Ingredients(recording.mav, setup.config, mav_rng, given.mav)
+        needs = Ingredients(recording.mav.calibration, setup.config, mav_rng, given.mav)
         mav = make_front_end(MAV, way["mav"], needs)
     if oracles and way["ground"] == "oracle":
         ground = oracles.ground
     else:
-        needs = Ingredients(recording.ground, setup.config, ground_rng, given.ground)
+        needs = Ingredients(recording.ground.calibration, setup.config, ground_rng, given.ground)
         ground = make_front_end(GROUND, way["ground"], needs)
     # They track in one thread, which waits where another process has more right to the core.
     clock = time.thread_time

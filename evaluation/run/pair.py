@@ -18,8 +18,8 @@ from airground.core.cloud import Source
 from airground.core.events import Aligned, BeliefUpdated, SurfaceCast
 from airground.core.trajectory import Trajectory
 from airground.errors import InputError
-from airground.io.pair import Pair
 from airground.io.ply import write_ply
+from airground.io.robot_recording import Pair
 from airground.io.tum import write_tum
 from airground.pipeline import Pipeline, sight
 from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end

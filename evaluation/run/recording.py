@@ -88,7 +88,7 @@ def run_recording(
     drops = drops or nothing_dropped(recording)
     measure = Measure(recording, truth, setup, seed, onlookers)
     task = TrackingTask(recording, truth, setup, seed, drops)
-    images = sum(len(recording.stamps_ns(robot)) for robot in Source)
+    images = sum(len(recording.of(robot).camera_stamps) for robot in Source)
     with (
         TrackingApart(task) if apart else nullcontext(TrackingHere(task)) as tracking,
         step("running", images, "images") as running,
@@ -128,7 +128,7 @@ def write_trajectories(folder: Path, recording: Recording, tracked: dict[str, Tr
     Poses are those of the robot's body, as in the recording's `truth/`, so that
     `evo_ape tum` compares the files as they are; a robot never tracked has none.
     """
-    calibrations = {"mav": recording.mav, "ground": recording.ground}
+    calibrations = {"mav": recording.mav.calibration, "ground": recording.ground.calibration}
     for robot, calibration in calibrations.items():
         T_camera_body = (calibration.T_body_imu @ calibration.T_imu_camera).inverse()
         ways = {robot: tracked[robot].final_poses()}
@@ -165,8 +165,8 @@ class Measure:
     ) -> None:
         self.pipeline = Pipeline(
             setup.config,
-            recording.mav,
-            recording.ground,
+            recording.mav.calibration,
+            recording.ground.calibration,
             pipeline_rng(seed),
         )
         enter(setup.given, self.pipeline)

@@ -86,7 +86,9 @@ class TrackingHere:
         self._messages = recording.messages(task.drops.dropped.by_robot())
         rng = front_end_rng(task.seed)
         self._watched = front_ends_for(task.setup, recording, task.truth, rng)
-        self._trackers = Trackers(recording.mav, recording.ground, self._watched.front_ends())
+        self._trackers = Trackers(
+            recording.mav.calibration, recording.ground.calibration, self._watched.front_ends()
+        )
 
     def wait_until_ready(self) -> None:
         """Compile."""

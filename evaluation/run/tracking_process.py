@@ -18,7 +18,8 @@ import numpy as np
 from airground.core.cloud import Source
 from airground.core.trajectory import Trajectory
 from airground.errors import AirgroundError
-from airground.io.recording import BOTH, Recording
+from airground.io.recording import Recording
+from airground.io.robot_recording import BOTH
 from airground.slam.warm_up import warm_up_slam
 from airground.tracking import RobotTracker, TrackedFrame
 from evaluation.run.drops import DropList
@@ -74,7 +75,7 @@ class RobotTrackingProcess:
     def __init__(self, task: TrackingTask, robot: Source) -> None:
         # Spawned, not forked: OpenMP's threads do not survive a fork.
         context = multiprocessing.get_context("spawn")
-        camera = task.recording.calibration(robot).camera
+        camera = task.recording.of(robot).calibration.camera
         self._ring = FrameRing(context, FRAMES_AHEAD, robot, camera.width * camera.height)
         self._pipe, theirs = context.Pipe()
         order = _Order(task.recording.path, robot, task.setup, task.seed, task.drops)
@@ -137,7 +138,7 @@ def _track(order: _Order, ring: FrameRing, pipe: Connection) -> None:
         recording = Recording.open(order.recording)
         truth = truth_for(order.setup, order.recording)
         watched = front_ends_for(order.setup, recording, truth, front_end_rng(order.seed))
-        calibration = recording.calibration(order.robot)
+        calibration = recording.of(order.robot).calibration
         tracker = RobotTracker(order.robot, calibration, watched.of(order.robot))
         warm_up_slam(np.random.default_rng(0))
         settle()

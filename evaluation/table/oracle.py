@@ -88,7 +88,7 @@ def oracle_front_ends(
 ) -> FrontEnds:
     """Oracles for both robots of a recording."""
     mav_rng, ground_rng = rng.spawn(2)
-    mav_stamps, ground_stamps = recording.mav_camera_stamps, recording.ground_camera_stamps
+    mav_stamps, ground_stamps = recording.mav.camera_stamps, recording.ground.camera_stamps
     mav_path = np.array([truth.T_world_mav_camera(int(t)).translation for t in mav_stamps])
     ground_path = np.array([truth.T_world_ground_camera(int(t)).translation for t in ground_stamps])
     mav_drift = _scaled(_wander(mav_stamps, mav_rng), mav_path, noise.drift_mav_m)

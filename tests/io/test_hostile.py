@@ -13,7 +13,7 @@ import pytest
 from airground.core.cloud import Source
 from airground.errors import AirgroundError
 from airground.io.images import read_depth, read_grey
-from airground.io.open_robot import open_robot
+from airground.io.open_recording import open_robot
 from airground.io.ply import read_ply
 from airground.io.recording import Recording
 from airground.io.sensor_file import read_mapping
@@ -83,7 +83,7 @@ def test_images_that_claim_to_be_huge(tmp_path: Path, size: tuple[int, int]) -> 
     recording = Recording.open(ours)
     image = ours / "mav0/cam0/data/83333333.png"
     image.write_bytes(png_that_claims(*size))
-    refused(lambda: recording.read_mav_image(1), rf"83333333\.png: is {size[0]}x{size[1]}")
+    refused(lambda: recording.mav.read_image(1), rf"83333333\.png: is {size[0]}x{size[1]}")
     refused(lambda: read_depth(image, 24, 16, 5000.0), "the calibration says 24x16")
 
 

@@ -13,7 +13,7 @@ import pytest
 from airground.core.cloud import Source
 from airground.core.messages import ImuSamples, MavImage
 from airground.errors import RecordingError
-from airground.io.open_robot import open_robot
+from airground.io.open_recording import open_robot
 from airground.io.robot_recording import RobotRecording
 from tests.io.plain_folders import (
     CAMERA_START_NS,

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from airground.core.cloud import Source
 from airground.core.messages import GroundImage, MavImage
 from airground.errors import RecordingError
-from airground.io.associate import associate
-from airground.io.open_robot import open_robot
+from airground.io.open_recording import open_robot
+from airground.io.plain_tum import associate
 from airground.io.robot_recording import RobotRecording
 from airground.io.tum import parse_stamp
 from tests.io.plain_folders import TUM_COLOUR_S, tum_image, write_tum

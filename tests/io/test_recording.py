@@ -35,13 +35,13 @@ def test_everything_comes_back_as_written(path: Path) -> None:
     recording.verify()
     assert (recording.scene, recording.seed, recording.flight) == ("indoor_a", 7, 1)
     assert recording.header.calibration == calibration()
-    assert (recording.mav_camera_stamps == MAV_STAMPS).all()
-    assert (recording.ground_camera_stamps == GROUND_STAMPS).all()
-    np.testing.assert_array_equal(recording.ground_imu.gyro, imu_samples().gyro)
-    np.testing.assert_array_equal(recording.mav_imu.accelerometer, imu_samples().accelerometer)
-    np.testing.assert_array_equal(recording.mav_magnetic.field, magnetic_samples().field)
-    pairs = zip(recording.mav_images(), recording.ground_images(), strict=True)
-    for index, (mav, ground) in enumerate(pairs):
+    assert (recording.mav.camera_stamps == MAV_STAMPS).all()
+    assert (recording.ground.camera_stamps == GROUND_STAMPS).all()
+    np.testing.assert_array_equal(recording.ground.imu.gyro, imu_samples().gyro)
+    np.testing.assert_array_equal(recording.mav.imu.accelerometer, imu_samples().accelerometer)
+    np.testing.assert_array_equal(recording.mav.magnetic.field, magnetic_samples().field)
+    for index in range(len(MAV_STAMPS)):
+        mav, ground = recording.mav.read_image(index), recording.ground.read_image(index)
         grey, colour, units = images(index)
         np.testing.assert_array_equal(mav.image, grey)
         np.testing.assert_array_equal(ground.colour, colour)
@@ -76,10 +76,10 @@ def test_messages_come_in_order_of_time_and_samples_before_their_image(path: Pat
 
 def test_an_image_is_found_by_its_stamp(path: Path) -> None:
     recording = Recording.open(path)
-    np.testing.assert_array_equal(recording.mav_image_at(83_333_333).image, images(1)[0])
-    np.testing.assert_array_equal(recording.ground_image_at(155_000_000).colour, images(3)[1])
+    np.testing.assert_array_equal(recording.mav.image_at(83_333_333).image, images(1)[0])
+    np.testing.assert_array_equal(recording.ground.image_at(155_000_000).colour, images(3)[1])
     with pytest.raises(ValueError, match="83333334"):
-        recording.mav_image_at(83_333_334)
+        recording.mav.image_at(83_333_334)
 
 
 def test_the_truth_is_never_opened(path: Path) -> None:

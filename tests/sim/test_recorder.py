@@ -58,8 +58,8 @@ def test_the_reader_finds_what_was_recorded(nominal: Path) -> None:
     images = [m.message for m in recording.messages()]
     assert sum(isinstance(m, MavImage) for m in images) == FRAMES
     assert sum(isinstance(m, GroundImage) for m in images) == FRAMES
-    assert recording.mav_images().__next__().image.shape == (480, 752)
-    assert recording.ground_images().__next__().colour.shape == (480, 640, 3)
+    assert recording.mav.read_image(0).image.shape == (480, 752)
+    assert recording.ground.read_image(0).colour.shape == (480, 640, 3)
     assert not (nominal / "world.mjb").exists()
     assert [path.name for path in nominal.parent.iterdir()] == ["recording"]
 
@@ -67,7 +67,7 @@ def test_the_reader_finds_what_was_recorded(nominal: Path) -> None:
 def test_the_truth_is_that_of_the_images(perfect: Path) -> None:
     """Depth by ray casting the true mesh from the true pose is what a perfect camera saw."""
     recording, truth = Recording.open(perfect), Truth.open(perfect)
-    for image in recording.ground_images():
+    for image in map(recording.ground.read_image, range(len(recording.ground.camera_stamps))):
         true = truth.depth("ground", image.stamp_ns)
         both = np.isfinite(true) & np.isfinite(image.depth)
         assert both.mean() > 0.5
@@ -78,7 +78,7 @@ def test_the_truth_is_that_of_the_images(perfect: Path) -> None:
 
 def test_the_clock_offset_moves_the_truth(nominal: Path) -> None:
     truth, recording = Truth.open(nominal), Recording.open(nominal)
-    stamp = int(recording.mav_camera_stamps[1])
+    stamp = int(recording.mav.camera_stamps[1])
     offset = truth.calibration.mav.camera.time_offset_ns
     assert abs(offset) == 1_000_000
     expected = truth.motion.camera_pose("mav", stamp + offset)
@@ -109,7 +109,7 @@ def test_depth_errs_by_scale_and_noise_only(nominal: Path) -> None:
     scale = truth.calibration.ground.depth.units_per_m / told
     assert abs(scale - 1) == pytest.approx(3e-3)
     ratios = []
-    for image in recording.ground_images():
+    for image in map(recording.ground.read_image, range(len(recording.ground.camera_stamps))):
         true = truth.depth("ground", image.stamp_ns)
         near = (true > 0.6) & (true < 3) & np.isfinite(image.depth)
         ratios.append((image.depth / true)[near])

@@ -55,14 +55,14 @@ def test_all_is_as_if_recorded_and_read(stored: Path) -> None:
         told = recording.header.model_dump(exclude={"digests"})
         assert drawn.header.model_dump(exclude={"digests"}) == told
         drawn_truth = Truth.open(drawn.path)
-        stamp = int(recording.ground_camera_stamps[1])
+        stamp = int(recording.ground.camera_stamps[1])
         np.testing.assert_array_equal(
             drawn_truth.depth("ground", stamp), truth.depth("ground", stamp)
         )
         assert not list(drawn.path.rglob("*.png"))
         for index in (2, 0, 0, 1):  # any order is served
-            image = recording.read_ground_image(index)
-            np.testing.assert_array_equal(drawn.read_ground_image(index).depth, image.depth)
+            image = recording.ground.read_image(index)
+            np.testing.assert_array_equal(drawn.ground.read_image(index).depth, image.depth)
     assert not drawn.path.exists()
     assert not multiprocessing.active_children()
 

@@ -10,7 +10,7 @@ import numpy as np
 from airground.core.cloud import Source
 from airground.errors import InputError, RecordingError
 from airground.io.layout import HEADER
-from airground.io.open_robot import open_robot
+from airground.io.open_recording import open_robot
 from airground.io.plain_euroc import euroc_folder
 from airground.io.plain_tum import is_tum_folder
 from airground.io.recording import Recording

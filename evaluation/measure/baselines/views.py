@@ -27,8 +27,8 @@ SAMPLED_POINTS = 500
 def aerial_view(recording: Recording, sighting: Sighting) -> View:
     """The MAV's reference image of the surface, at full resolution."""
     surface = sighting.surface
-    image = recording.mav_image_at(surface.reference_stamp_ns)
-    return View(image.stamp_ns, recording.mav.camera, surface.T_mav_camera, image.image)
+    image = recording.mav.image_at(surface.reference_stamp_ns)
+    return View(image.stamp_ns, recording.mav.calibration.camera, surface.T_mav_camera, image.image)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class GroundViews:
         """
         points = T_ground_mav @ _sampled(sighting.surface.cloud_mav.points)
         mav = (T_ground_mav @ sighting.surface.T_mav_camera).translation
-        camera = self.recording.ground.camera
+        camera = self.recording.ground.calibration.camera
         rated = [
             (_likeness(points, mav, camera, pose), stamp_ns, pose)
             for stamp_ns, pose in self._candidates(sighting.ground_stamp_ns)
@@ -78,9 +78,9 @@ class GroundViews:
         return kept
 
     def _view(self, stamp_ns: int, pose: SE3) -> View:
-        image = self.recording.ground_image_at(stamp_ns)
+        image = self.recording.ground.image_at(stamp_ns)
         grey = np.asarray(cv2.cvtColor(image.colour, cv2.COLOR_RGB2GRAY), np.uint8)
-        return View(stamp_ns, self.recording.ground.camera, pose, grey, image.depth)
+        return View(stamp_ns, self.recording.ground.calibration.camera, pose, grey, image.depth)
 
 
 def _sampled(points: NDArray) -> NDArray:

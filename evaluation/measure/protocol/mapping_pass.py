@@ -66,8 +66,10 @@ def map_recording(recording: Recording, truth: Truth, setup: Setup, seed: int) -
     """Run the upper half of Figure 4 over a whole recording."""
     rng = np.random.default_rng([seed, 0])
     watched = front_ends_for(setup, recording, truth, rng)
-    trackers = Trackers(recording.mav, recording.ground, watched.front_ends())
-    mapping = Mapping(setup.config, recording.mav, recording.ground)
+    trackers = Trackers(
+        recording.mav.calibration, recording.ground.calibration, watched.front_ends()
+    )
+    mapping = Mapping(setup.config, recording.mav.calibration, recording.ground.calibration)
     maps = Maps()
     made: dict[int, DepthMap] = {}
     fused: list[DepthMap] = []
@@ -102,10 +104,12 @@ def map_ground(recording: Recording, truth: Truth, setup: Setup, seed: int) -> G
         What it left, or None where the robot never knew where it was.
     """
     watched = front_ends_for(setup, recording, truth, np.random.default_rng([seed, 0]))
-    trackers = Trackers(recording.mav, recording.ground, watched.front_ends())
-    mapping = Mapping(setup.config, recording.mav, recording.ground)
+    trackers = Trackers(
+        recording.mav.calibration, recording.ground.calibration, watched.front_ends()
+    )
+    mapping = Mapping(setup.config, recording.mav.calibration, recording.ground.calibration)
     # The MAV sees nothing, and so costs nothing.
-    blind = {Source.MAV: recording.mav_camera_stamps.tolist()}
+    blind = {Source.MAV: recording.mav.camera_stamps.tolist()}
     for _ in _events(trackers.frames(recording.messages(blind)), mapping):
         pass
     mapping.correct_ground(trackers.finish())

@@ -55,7 +55,7 @@ def run_live(
         AirgroundError: A robot's process refused its task, or could not go on.
     """
     measure = Measure(recording, truth, setup, seed)
-    images = sum(len(recording.stamps_ns(robot)) for robot in Source)
+    images = sum(len(recording.of(robot).camera_stamps) for robot in Source)
     with ExitStack() as stack, step("playing", images, "images") as playing:
         robots = [
             _start(recording, robot, setup, seed, playback, stack)
@@ -114,7 +114,7 @@ def _start(
 
 
 def _clock(recording: Recording, rate: float) -> PlaybackClock:
-    first_ns = min(int(recording.stamps_ns(robot)[0]) for robot in Source)
+    first_ns = min(int(recording.of(robot).camera_stamps[0]) for robot in Source)
     return PlaybackClock(first_ns, time.monotonic_ns() + START_NS, rate)
 
 

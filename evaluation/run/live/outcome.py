@@ -48,7 +48,7 @@ class Lived:
             name = robot.name.lower()
             if report is None:
                 # Whatever it tracked, the mapper knows only this.
-                everything = set(recording.stamps_ns(robot).tolist())
+                everything = set(recording.of(robot).camera_stamps.tolist())
                 dropped[name] = frozenset(everything - self.mapped_ns[robot].keys())
                 continue
             dropped[name] = frozenset(report.played.dropped_ns)

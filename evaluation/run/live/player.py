@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 from airground.core.cloud import Source
 from airground.core.messages import GroundImage, MavImage
-from airground.io.message_order import Bundler
 from airground.io.recording import Recording
+from airground.io.robot_recording import Bundler
 from airground.tracking import RobotTracker, TrackedFrame
 from evaluation.run.live.playback import Clock
 
@@ -89,13 +89,13 @@ def play(
         capacity: How many images may wait.
         hand_over: Is given each frame when it has its pose, and does not block.
     """
-    stamps_ns = recording.stamps_ns(robot).tolist()
+    stamps_ns = recording.of(robot).camera_stamps.tolist()
     queue = FrameQueue(stamps_ns, capacity)
-    bundler = Bundler(robot, *recording.samples(robot))
+    bundler = recording.of(robot).bundler()
     posed_ns = {}
     started_s = time.process_time()
     while (index := queue.take(clock.now_ns())) is not None:
-        image = recording.read_image(robot, index)
+        image = recording.of(robot).read_image(index)
         clock.wait_until(image.stamp_ns)
         frame = _tracked(tracker, bundler, image)
         posed_ns[image.stamp_ns] = clock.now_ns()

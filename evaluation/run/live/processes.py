@@ -169,7 +169,7 @@ def _report(task: TrackerTask, pipe: Connection) -> TrackerReport:
     recording = Recording.open(task.recording)
     truth = truth_for(task.setup, task.recording)
     watched = front_ends_for(task.setup, recording, truth, front_end_rng(task.seed))
-    tracker = RobotTracker(task.robot, recording.calibration(task.robot), watched.of(task.robot))
+    tracker = RobotTracker(task.robot, recording.of(task.robot).calibration, watched.of(task.robot))
     if task.robot.name.lower() in task.setup.slam_robots():
         warm_up_slam(np.random.default_rng(0))
         # SLAM loads it when a loop closes; here nobody can wait for that.

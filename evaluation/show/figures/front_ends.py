@@ -20,7 +20,7 @@ from airground.core.cloud import Source
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.errors import InputError
-from airground.io.open_robot import open_robot
+from airground.io.open_recording import open_robot
 from airground.io.robot_recording import RobotRecording
 from airground.slam import front_ends
 from airground.slam.front_end import FrontEnd

@@ -187,7 +187,7 @@ def test_peak_memory_counts_touched_pages_only() -> None:
 
 
 def test_memory_is_read_after_each_tenth_of_the_recording(material: Material) -> None:
-    stamps_ns = material.recording.stamps_ns(Source.GROUND)
+    stamps_ns = material.recording.of(Source.GROUND).camera_stamps
     log = MemoryLog(material.recording, [os.getpid()])
     for stamp_ns in stamps_ns:
         log.take(MavTracked(int(stamp_ns), SE3.identity()))

@@ -165,9 +165,9 @@ def test_the_error_is_measured_in_pixels(
     posed = []
     for index in (2, 2 + APART):
         if robot == "mav":
-            grey = recording.read_mav_image(index).image
+            grey = recording.mav.read_image(index).image
         else:
-            grey = recording.read_ground_image(index).colour.mean(axis=2).astype(np.uint8)
+            grey = recording.ground.read_image(index).colour.mean(axis=2).astype(np.uint8)
         depth = truth.depth(robot, stamps[index])  # type: ignore[arg-type]
         posed.append(Posed(grey, depth, truth.T_world_camera(robot, stamps[index])))  # type: ignore[arg-type]
     x, y = offset

@@ -13,7 +13,7 @@ from evo.tools import file_interface
 from airground.core.cloud import Source
 from airground.core.messages import GroundImage
 from airground.core.se3 import SE3
-from airground.io.open_robot import open_robot
+from airground.io.open_recording import open_robot
 from airground.io.tum import read_tum
 from evaluation.datasets.simulated import Simulated
 from evaluation.table.true_camera import true_camera

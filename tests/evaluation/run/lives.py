@@ -96,7 +96,7 @@ class Robots:
                 None if radio is None else Radio(radio, np.random.default_rng(0)),
                 None if radio is None else radio.jpeg_quality,
             )
-            tracker = RobotTracker(robot, self.recording.calibration(robot), front_end)
+            tracker = RobotTracker(robot, self.recording.of(robot).calibration, front_end)
             capacity = self.waiting_frames
             self.played[robot] = play(self.recording, robot, tracker, clock, capacity, uplink.offer)
             uplink.close(tracker.finish())
@@ -126,7 +126,7 @@ class Robots:
 def offline(recording: Recording, drops: DropList) -> list[TrackedFrame]:
     """What the mapper gets in a run that takes its time and does without the same frames."""
     front_ends = FrontEnds(Remembering(), Remembering())
-    trackers = Trackers(recording.mav, recording.ground, front_ends)
+    trackers = Trackers(recording.mav.calibration, recording.ground.calibration, front_ends)
     messages = recording.messages(drops.dropped.by_robot())
     return list(drops.received(trackers.frames(messages)))
 

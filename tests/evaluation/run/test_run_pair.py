@@ -19,10 +19,10 @@ from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.errors import InputError, RecordingError
 from airground.io.digests import file_digest
-from airground.io.open_robot import open_robot
-from airground.io.pair import Pair
+from airground.io.open_recording import open_robot
 from airground.io.ply import read_ply, write_ply
 from airground.io.recording import Recording
+from airground.io.robot_recording import Pair
 from airground.io.tum import read_tum, write_tum
 from evaluation import cli
 from evaluation.datasets.formats import FORMATS, robots_for
@@ -95,7 +95,7 @@ def test_an_export_comes_back_message_by_message(small: Path, tmp_path: Path) ->
 def test_an_exports_calibration_comes_back(small: Path, tmp_path: Path) -> None:
     recording, pair = Recording.open(small), exported(small, tmp_path)
     for robot in Source:
-        told, back = recording.calibration(robot), pair.of(robot).calibration
+        told, back = recording.of(robot).calibration, pair.of(robot).calibration
         assert told.camera == back.camera
         assert told.imu == back.imu
         np.testing.assert_array_equal(told.T_imu_camera.matrix(), back.T_imu_camera.matrix())

@@ -51,7 +51,7 @@ def test_frames_and_report_are_those_of_tracking_here(
     small: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tracking_process, "FRAMES_AHEAD", 5)  # slots are used again
-    dropped = (int(Recording.open(small).mav_camera_stamps[4]),)
+    dropped = (int(Recording.open(small).mav.camera_stamps[4]),)
     here = TrackingHere(task(small, dropped))
     wanted = [content(frame) for frame in here.in_turn()]
     report = here.report()
@@ -98,11 +98,11 @@ def test_frames_can_be_kept(small: Path, monkeypatch: pytest.MonkeyPatch) -> Non
     recording = Recording.open(small)
     for frame in frames:
         if isinstance(frame.image, GroundImage):
-            stored = recording.ground_image_at(frame.stamp_ns)
+            stored = recording.ground.image_at(frame.stamp_ns)
             assert frame.image.colour.tobytes() == stored.colour.tobytes()
             assert frame.image.depth.tobytes() == stored.depth.tobytes()
         else:
-            stored_grey = recording.mav_image_at(frame.stamp_ns).image
+            stored_grey = recording.mav.image_at(frame.stamp_ns).image
             assert frame.image.image.tobytes() == stored_grey.tobytes()
 
 

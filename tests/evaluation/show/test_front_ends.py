@@ -10,7 +10,7 @@ import pytest
 from airground.config import Config
 from airground.core.cloud import Source
 from airground.errors import InputError
-from airground.io.open_robot import open_robot
+from airground.io.open_recording import open_robot
 from evaluation.show.figures.front_ends import front_end_error, main
 from tests.evaluation.plain_recordings import write_tum_folder
 from tests.slam.synthetic_world import ground_sequence

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from airground.core.cloud import Source
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
-from airground.io.open_robot import open_robot
+from airground.io.open_recording import open_robot
 from airground.io.tum import write_tum
 from evaluation.table.true_camera import true_camera
 from tests.evaluation.plain_recordings import write_tum_folder

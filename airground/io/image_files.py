@@ -1,9 +1,10 @@
-"""Where the images of a recording come from: files, or whoever makes them when asked."""
+"""Where the images of a recording come from: its files, or a renderer."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Protocol
 
 import numpy as np
@@ -28,11 +29,11 @@ class ImageSource(Protocol):
 
 @dataclass(frozen=True)
 class ImageFiles:
-    """Images on disk, each read when it is asked for.
+    """Images on disk, each read when it is needed.
 
     Attributes:
-        mav_files, ground_colour_files, ground_depth_files: In order of time.
-        mav_camera, ground_camera: They give the size that the images must have.
+        mav_files, ground_colour_files, ground_depth_files: Files in order of time.
+        mav_camera, ground_camera: Cameras, whose size the images must have.
         depth_units_per_m: PNG value of one metre of depth.
     """
 
@@ -67,3 +68,26 @@ def _listing(folder: Path) -> list[Path]:
         return list(folder.iterdir())
     except OSError as error:
         raise RecordingError(f"{folder}: cannot be listed: {error.strerror}") from None
+
+
+def listed_files(folder: Path, names: Iterable[str], list_path: Path) -> list[Path]:
+    """The files that a list names; a list from elsewhere must not lead out of its folder.
+
+    Args:
+        folder: Folder that the names are relative to.
+        names: Names as they stand in the list.
+        list_path: The list, for the message.
+
+    Raises:
+        RecordingError: A name leads out of the folder.
+    """
+    files = []
+    for name in names:
+        path = PurePosixPath(name)
+        if path.is_absolute() or ".." in path.parts or "\0" in name:
+            raise RecordingError(
+                f"{list_path}: the file name {name[:60]!r} leads out of the recording; expected "
+                "one below the folder, without '..'"
+            )
+        files.append(folder / path)
+    return files

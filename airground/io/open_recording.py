@@ -1,8 +1,9 @@
-"""One robot's part of any folder that can be read."""
+"""Opens what one or both robots recorded: a recording of ours, plain EuRoC or TUM RGB-D folders."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any, overload
 
 from airground.core.cloud import Source
 from airground.errors import RecordingError
@@ -10,14 +11,41 @@ from airground.io import layout
 from airground.io.plain_euroc import euroc_folder, open_euroc
 from airground.io.plain_tum import is_tum_folder, open_tum
 from airground.io.recording import Recording
-from airground.io.robot_recording import RobotRecording
+from airground.io.robot_recording import Pair, RobotRecording
 
 
-def open_robot(path: Path, robot: Source, calibration_file: Path | None = None) -> RobotRecording:
-    """Open what one robot recorded: a recording of ours, a plain EuRoC or TUM RGB-D folder.
+@overload
+def open_recording(path: Path | str) -> Recording: ...
+@overload
+def open_recording(path: Path | str, ground: Path | str) -> Pair: ...
+def open_recording(path: Path | str, ground: Path | str | None = None) -> Pair:
+    """Open what both robots recorded.
 
     Args:
-        path: The folder.
+        path: A recording of ours; with `ground`, the folder of the MAV: ours, EuRoC or TUM RGB-D.
+        ground: The folder of the ground robot: ours or TUM RGB-D, stamped by the MAV's clock.
+
+    Raises:
+        RecordingError: A folder is none of these, holds no such robot, or is damaged.
+    """
+    path = Path(path)
+    if ground is not None:
+        return Pair(open_robot(path, Source.MAV), open_robot(Path(ground), Source.GROUND))
+    one_robot = euroc_folder(path) is not None or is_tum_folder(path)
+    if one_robot and not (path / layout.HEADER).exists():
+        raise RecordingError(
+            f"{path}: holds one robot only; give the MAV's and the ground robot's folders"
+        )
+    return Recording.open(path)
+
+
+def open_robot(
+    path: Path | str, robot: Source, calibration_file: Path | None = None
+) -> RobotRecording[Any]:
+    """Open what one robot recorded.
+
+    Args:
+        path: A recording of ours, or a plain EuRoC or TUM RGB-D folder.
         robot: MAV (one grey camera) or ground robot (colour and depth).
         calibration_file: Camera calibration of a plain folder, in the form of EuRoC's
             `sensor.yaml`.
@@ -34,7 +62,7 @@ def open_robot(path: Path, robot: Source, calibration_file: Path | None = None) 
                 f"{calibration_file}: {path} has its own calibration in {layout.HEADER}; "
                 "a file is only for plain EuRoC and TUM RGB-D folders"
             )
-        return _part(Recording.open(path), robot)
+        return Recording.open(path).of(robot)
     if euroc_folder(path) is not None:
         if robot != Source.MAV:
             raise RecordingError(
@@ -46,21 +74,4 @@ def open_robot(path: Path, robot: Source, calibration_file: Path | None = None) 
     raise RecordingError(
         f"{path}: holds neither {layout.HEADER} (a recording of ours) nor mav0/cam0 (EuRoC) "
         "nor rgb.txt (TUM RGB-D)"
-    )
-
-
-def _part(recording: Recording, robot: Source) -> RobotRecording:
-    is_mav = robot == Source.MAV
-    calibration = recording.mav if is_mav else recording.ground
-    return RobotRecording(
-        path=recording.path,
-        layout="airground",
-        robot=robot,
-        calibration=calibration,
-        camera_stamps=recording.mav_camera_stamps if is_mav else recording.ground_camera_stamps,
-        imu=recording.mav_imu if is_mav else recording.ground_imu,
-        magnetic=recording.mav_magnetic if is_mav else recording.ground_magnetic,
-        read_image=recording.read_mav_image if is_mav else recording.read_ground_image,
-        pose_frame="body",
-        T_pose_camera=calibration.T_body_imu @ calibration.T_imu_camera,
     )
