@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import ast
-import sys
-import tomllib
-from collections.abc import Iterator
-from functools import cache
+from collections import defaultdict
+from collections.abc import Iterable
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
-import pytest
+from tests.sources import ROOMS, ROOT, calls, imports, nodes, sources, strings, tree
 
-ROOT = Path(__file__).parent.parent
-ROOMS = ("airground", "sim", "evaluation")
 EVALUATION_LAYERS = (
     "setup",
     "table",
@@ -46,45 +43,7 @@ MEETING_PLACES = ("pipeline", "tracking", "link", "warm_up")
 and what compiles all stages above tracking."""
 RECORDING_WRITERS = ("airground/io/layout.py", "airground/io/recording_writer.py")
 """Know the name of the truth's folder, since `sim` writes recordings through them."""
-PEERS = ("evaluation/bench/peers.py",)
-"""Times other libraries, of which some need not be installed."""
 MAX_LINES = 350
-
-DISTRIBUTION_OF = {
-    "rerun_cli": "rerun-sdk",
-    "OpenGL": "pyopengl",
-    "PIL": "pillow",
-    "cv2": "opencv-python-headless",
-    "kiss_matcher": "kiss-matcher",
-    "rerun": "rerun-sdk",
-    "skimage": "scikit-image",
-    "small_gicp": "small-gicp",
-    "tomli_w": "tomli-w",
-    "yaml": "pyyaml",
-    "zmq": "pyzmq",
-}
-"""Imports whose package is called otherwise."""
-
-
-def sources(*folders: str) -> list[str]:
-    """Every Python file below the folders, relative to the repository."""
-    files = [file for folder in folders for file in (ROOT / folder).rglob("*.py")]
-    return sorted(str(file.relative_to(ROOT)) for file in files)
-
-
-@cache
-def tree(file: str) -> ast.Module:
-    return ast.parse((ROOT / file).read_text(encoding="utf-8"), filename=file)
-
-
-def imports(file: str) -> Iterator[str]:
-    """Dotted names of all that a file imports, wherever in the file it does."""
-    for node in ast.walk(tree(file)):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{file}:{node.lineno}: relative import"
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
 def importing(files: list[str], *forbidden: str) -> list[str]:
@@ -139,6 +98,52 @@ def climbing(package: str, layers: tuple[str, ...]) -> list[str]:
     return wrong
 
 
+def test_no_modules_import_each_other() -> None:
+    assert cycle(module_imports()) is None
+
+
+def test_no_files_and_folders_side_by_side_import_each_other() -> None:
+    """In every package, what lies directly in it can be put into one order."""
+    beside: dict[str, list[tuple[str, str]]] = defaultdict(list)
+    for importer, imported in module_imports():
+        one, other = importer.split("."), imported.split(".")
+        shared = 0
+        while shared < min(len(one), len(other)) and one[shared] == other[shared]:
+            shared += 1
+        if 0 < shared < min(len(one), len(other)):
+            beside[".".join(one[:shared])].append((one[shared], other[shared]))
+    cycles = {package: cycle(pairs) for package, pairs in beside.items()}
+    assert {package: found for package, found in cycles.items() if found} == {}
+
+
+def module_imports() -> list[tuple[str, str]]:
+    """(importing module, imported module) for all modules of the project."""
+    files = {
+        file.removesuffix(".py").replace("/", ".").removesuffix(".__init__"): file
+        for file in sources(*ROOMS)
+    }
+    pairs = []
+    for module, file in files.items():
+        for name in imports(file):
+            while name and name not in files:
+                name = name.rpartition(".")[0]
+            if name and name != module:
+                pairs.append((module, name))
+    return pairs
+
+
+def cycle(pairs: Iterable[tuple[str, str]]) -> list[str] | None:
+    """A cycle of imports, or None."""
+    graph: dict[str, set[str]] = defaultdict(set)
+    for importer, imported in pairs:
+        graph[importer].add(imported)
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return error.args[1]
+    return None
+
+
 def test_stages_do_not_import_each_other() -> None:
     wrong = []
     for file in sources("airground"):
@@ -179,30 +184,12 @@ def test_tracking_knows_nothing_of_mapping() -> None:
     assert importing(["airground/tracking.py", *sources("airground/link")], *forbidden) == []
 
 
-def strings(file: str) -> Iterator[tuple[int, str]]:
-    """Text in the code, docstrings apart."""
-    docstrings = set()
-    for node in ast.walk(tree(file)):
-        body = getattr(node, "body", None)
-        if isinstance(body, list):
-            docstrings |= {
-                id(child.value)
-                for child in body
-                if isinstance(child, ast.Expr) and isinstance(child.value, ast.Constant)
-            }
-    for node in ast.walk(tree(file)):
-        if not isinstance(node, ast.Constant) or id(node) in docstrings:
-            continue
-        if isinstance(node.value, str):
-            yield node.lineno, node.value
-
-
 def test_airground_never_names_the_truth() -> None:
     """No path, key or variable of `airground` leads to what only the evaluator may know."""
     wrong = []
     for file in sorted(set(sources("airground")) - set(RECORDING_WRITERS)):
         wrong += [f"{file}:{n}: {text!r}" for n, text in strings(file) if "truth" in text.lower()]
-        for node in ast.walk(tree(file)):
+        for node in nodes(file):
             name = getattr(node, "id", None) or getattr(node, "attr", None)
             name = name or getattr(node, "arg", None) or getattr(node, "name", None)
             if isinstance(name, str) and ("truth" in name.lower() or "world" in name.lower()):
@@ -223,22 +210,21 @@ def test_only_io_reads_files() -> None:
     assert reading == []
 
 
-def calls(file: str) -> Iterator[tuple[int, str]]:
-    for node in ast.walk(tree(file)):
-        if isinstance(node, ast.Call):
-            yield node.lineno, ast.unparse(node.func)
-
-
 def test_nothing_executes_what_it_reads() -> None:
     """No pickle, eval, exec or shell: a recording from a stranger is only data."""
     assert importing(sources(*ROOMS), "pickle", "marshal", "shelve", "dill", "joblib") == []
     forbidden = {"eval", "exec", "compile", "os.system", "yaml.load", "__import__"}
     wrong = [f"{f}:{n}: {c}" for f in sources(*ROOMS) for n, c in calls(f) if c in forbidden]
     assert wrong == []
-    for file in sources(*ROOMS):
-        for node in ast.walk(tree(file)):
-            if isinstance(node, ast.keyword) and node.arg in ("allow_pickle", "shell"):
-                assert ast.unparse(node.value) == "False", f"{file}:{node.value.lineno}"
+    allowing = [
+        f"{file}:{node.value.lineno}: {node.arg}"
+        for file in sources(*ROOMS)
+        for node in nodes(file)
+        if isinstance(node, ast.keyword)
+        and node.arg in ("allow_pickle", "shell")
+        and ast.unparse(node.value) != "False"
+    ]
+    assert allowing == []
 
 
 def test_libraries_do_not_print_or_exit() -> None:
@@ -273,17 +259,19 @@ def test_randomness_comes_from_a_generator_passed_in() -> None:
     assert seeded_inside == []
 
 
-@pytest.mark.parametrize("file", sources(*ROOMS, "tests"))
-def test_files_stay_readable(file: str) -> None:
-    lines = (ROOT / file).read_text(encoding="utf-8").splitlines()
-    assert len(lines) <= MAX_LINES, f"{file} has {len(lines)} lines"
+def test_files_stay_readable() -> None:
+    lines = {
+        file: (ROOT / file).read_text("utf-8").count("\n") for file in sources(*ROOMS, "tests")
+    }
+    assert {file: count for file, count in lines.items() if count > MAX_LINES} == {}
 
 
-@pytest.mark.parametrize("file", sources(*ROOMS))
-def test_modules_and_public_names_are_documented(file: str) -> None:
-    assert ast.get_docstring(tree(file)) is not None, f"{file} does not say what it is for"
+def test_modules_and_public_names_are_documented() -> None:
+    silent = [file for file in sources(*ROOMS) if ast.get_docstring(tree(file)) is None]
+    assert silent == []
     bare = [
         f"{file}:{node.lineno}: {node.name}"
+        for file in sources(*ROOMS)
         for node in tree(file).body
         if isinstance(node, ast.ClassDef | ast.FunctionDef)
         and ast.get_docstring(node) is None
@@ -291,44 +279,3 @@ def test_modules_and_public_names_are_documented(file: str) -> None:
         and not (node.name.startswith("_") or len(node.body) <= 10)
     ]
     assert bare == []
-
-
-def test_every_import_is_a_declared_dependency() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    declared = {_distribution(line) for line in project["dependencies"]}
-    extras = project["optional-dependencies"]
-    for_tests = declared | {_distribution(line) for line in extras["dev"]}
-    for_baselines = declared | {_distribution(line) for line in extras["baselines"]}
-    baselines = {*sources("evaluation/measure/baselines"), *PEERS}
-    assert _undeclared(sorted(set(sources(*ROOMS)) - baselines), declared) == []
-    assert _undeclared(sorted(baselines), for_baselines) == []
-    assert _undeclared(sources("tests"), for_tests) == []
-
-
-def _undeclared(files: list[str], declared: set[str]) -> list[str]:
-    ours = {*ROOMS, "tests", "scenes", "__future__"}
-    wrong = []
-    for file in files:
-        for module in {name.partition(".")[0] for name in imports(file)}:
-            if module in ours or module in sys.stdlib_module_names:
-                continue
-            if DISTRIBUTION_OF.get(module, module).lower() not in declared:
-                wrong.append(f"{file} imports {module}")
-    return sorted(wrong)
-
-
-def _distribution(requirement: str) -> str:
-    for character in "<>=!~;[ ":
-        requirement = requirement.partition(character)[0]
-    return requirement.lower()
-
-
-def test_locked_packages_carry_names_versions_and_hashes_only() -> None:
-    lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
-    lines = [line.strip().rstrip("\\").strip() for line in lock.splitlines()]
-    for line in lines:
-        kinds = ("#", "--hash=sha256:")
-        assert not line or line.startswith(kinds) or "==" in line, line
-        assert "://" not in line, line
-        assert not line.startswith(("-i", "--index", "--extra-index", "--find-links")), line
-    assert "pyopengl==3.1.10" in [line.partition(" ")[0] for line in lines]
