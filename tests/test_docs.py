@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import json
 import re
 import runpy
 from collections.abc import Iterator
@@ -15,9 +16,12 @@ from pydantic import BaseModel
 
 from airground.config import Config
 from evaluation.cli import VERBS
+from evaluation.datasets.formats import FORMATS
 from evaluation.judge.results import CONFIG, SHOWCASE, SUMMARY, TABLE
 from evaluation.judge.summary import Summary
+from evaluation.measure.plans.dials import DIALS
 from evaluation.table.rows import ResultTable
+from sim import scene
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -210,3 +214,45 @@ def test_every_column_of_the_results_is_explained() -> None:
 def test_every_file_of_a_run_is_explained() -> None:
     files = named_in(part_of("formats.md", "What a run leaves"))
     assert {TABLE, SUMMARY, CONFIG, f"{SHOWCASE}/"} <= files
+
+
+SCENE_TABLES = {
+    "`[room]`": scene.Room,
+    '`[rubble]`, for kind `"rubble"`': scene.Rubble,
+    '`[terrain]`, for kind `"terrain"`': scene.Terrain,
+    "`[light]`": scene.Light,
+    "`[mav]`": scene.MavPath,
+    "`[ground]`": scene.GroundPath,
+}
+"""Headings of add_a_scene.md."""
+
+
+@pytest.mark.parametrize("heading", SCENE_TABLES)
+def test_keys_of_a_scene_are_explained_with_their_defaults(heading: str) -> None:
+    documented: dict[str, Any] = {}
+    for row in re.findall(r"^\| (`\w+`.*)$", part_of("add_a_scene.md", heading), re.MULTILINE):
+        names, defaults, *_ = row.split(" |")
+        values = json.loads(f"[{defaults.replace('`', '').replace('none', 'null')}]")
+        keys = re.findall(r"`(\w+)`", names)
+        documented |= dict(zip(keys, values or ["required"] * len(keys), strict=True))
+    fields = SCENE_TABLES[heading].model_fields
+    assert documented == {
+        name: "required" if field.is_required() else json.loads(json.dumps(field.default))
+        for name, field in fields.items()
+    }
+
+
+def test_keys_at_the_top_of_a_scene_are_explained() -> None:
+    text = (ROOT / "docs" / "add_a_scene.md").read_text(encoding="utf-8")
+    explained = named_in(without_code(text))
+    headings = {name.partition("]")[0].strip("[") for name in explained if name.startswith("[")}
+    assert set(scene.Scene.model_fields) <= explained | headings
+
+
+def test_every_dial_of_a_sweep_is_explained() -> None:
+    assert {dial.name for dial in DIALS} <= named_in(part_of("sweep.md", "Dials"))
+
+
+def test_every_export_format_is_explained() -> None:
+    page = (ROOT / "docs" / "datasets.md").read_text(encoding="utf-8")
+    assert {name for name in FORMATS if f"(`{name}`)" not in page} == set()
