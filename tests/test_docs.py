@@ -7,7 +7,7 @@ import importlib.util
 import json
 import re
 import runpy
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, get_args
 
@@ -15,7 +15,7 @@ import pytest
 from pydantic import BaseModel
 
 from airground.config import Config
-from evaluation.cli import VERBS
+from evaluation.cli import VERBS, parse
 from evaluation.datasets.formats import FORMATS
 from evaluation.judge.results import CONFIG, SHOWCASE, SUMMARY, TABLE
 from evaluation.judge.summary import Summary
@@ -31,15 +31,11 @@ PARAMETER = re.compile(
 )
 
 
-@pytest.fixture(params=PAGES, ids=[page.name for page in PAGES])
-def page(request: pytest.FixtureRequest) -> Path:
-    return request.param
-
-
 ROOMS = "airground|sim|evaluation"
 PATH = re.compile(rf"(?<![\w/.-])(?:\.\./)?((?:{ROOMS}|tests|scenes|docs)/[\w/.*-]*\w)")
 DOTTED = re.compile(rf"(?<![\w/.-])((?:{ROOMS})(?:\.\w+)+)")
 IMPORT = re.compile(rf"^\s*from ((?:{ROOMS})[\w.]*) import ([\w, ]+)$", re.MULTILINE)
+COMMAND = re.compile(r"(?:^|`|bin/)airground\s([a-z]+)([^`\n#]*)", re.MULTILINE)
 WRITTEN_BY_THE_READER = {
     "evaluation/measure/baselines/highest_heap.py",
     "evaluation.measure.baselines.highest_heap",
@@ -50,20 +46,28 @@ NOT_FOR_PROGRAMS = re.compile(
 )
 
 
+def offenders(found_in: Callable[[Path, str], Iterable[str]]) -> dict[str, list[str]]:
+    """What is wrong in each page, by its name; pages without a fault are left out."""
+    texts = {page: page.read_text(encoding="utf-8") for page in PAGES}
+    wrong = {page.name: sorted(set(found_in(page, text))) for page, text in texts.items()}
+    return {name: found for name, found in wrong.items() if found}
+
+
 def without_code(text: str) -> str:
     return re.sub(r"```.*?```", "", text, flags=re.DOTALL)
 
 
-def test_links_lead_to_files_and_headings(page: Path) -> None:
-    broken = []
-    for target in re.findall(r"\]\(([^)\s]+)\)", without_code(page.read_text(encoding="utf-8"))):
-        if target.startswith(("http:", "https:")):
-            continue
-        path, _, heading = target.partition("#")
-        file = (page.parent / path).resolve() if path else page
-        if not file.exists() or (heading and heading not in headings(file)):
-            broken.append(target)
-    assert broken == []
+def test_links_lead_to_files_and_headings() -> None:
+    def broken(page: Path, text: str) -> Iterator[str]:
+        for target in re.findall(r"\]\(([^)\s]+)\)", without_code(text)):
+            path, _, heading = target.partition("#")
+            file = (page.parent / path).resolve() if path else page
+            if target.startswith(("http:", "https:")):
+                continue
+            if not file.exists() or (heading and heading not in headings(file)):
+                yield target
+
+    assert offenders(broken) == {}
 
 
 def headings(file: Path) -> set[str]:
@@ -72,25 +76,23 @@ def headings(file: Path) -> set[str]:
     return {re.sub(r"[^\w\- ]", "", one.lower()).replace(" ", "-") for one in found}
 
 
-def test_files_exist(page: Path) -> None:
-    named = set(PATH.findall(page.read_text(encoding="utf-8"))) - WRITTEN_BY_THE_READER
-    missing = {name for name in named if not list(ROOT.glob(name))}
-    assert missing == set()
+def test_files_exist() -> None:
+    def missing(page: Path, text: str) -> Iterator[str]:
+        named = set(PATH.findall(text)) - WRITTEN_BY_THE_READER
+        return (name for name in named if not list(ROOT.glob(name)))
+
+    assert offenders(missing) == {}
 
 
-def test_modules_exist(page: Path) -> None:
-    text = page.read_text(encoding="utf-8")
-    named = set(DOTTED.findall(text)) - WRITTEN_BY_THE_READER
-    assert {name for name in named if not exists(name)} == set()
+def test_modules_and_imported_names_exist() -> None:
+    def missing(page: Path, text: str) -> Iterator[str]:
+        named = set(DOTTED.findall(text))
+        for module, names in IMPORT.findall(text):
+            if module not in WRITTEN_BY_THE_READER:
+                named |= {f"{module}.{name.strip()}" for name in names.split(",")}
+        return (name for name in named - WRITTEN_BY_THE_READER if not exists(name))
 
-
-def test_imported_names_exist(page: Path) -> None:
-    missing = []
-    for module, names in IMPORT.findall(page.read_text(encoding="utf-8")):
-        for name in names.split(","):
-            if module not in WRITTEN_BY_THE_READER and not exists(f"{module}.{name.strip()}"):
-                missing.append(f"{module}.{name.strip()}")
-    assert missing == []
+    assert offenders(missing) == {}
 
 
 def exists(dotted: str) -> bool:
@@ -116,23 +118,40 @@ def is_module(name: str) -> bool:
         return False
 
 
-def test_pages_name_no_person_for_a_program(page: Path) -> None:
-    assert NOT_FOR_PROGRAMS.findall(page.read_text(encoding="utf-8")) == []
+def test_words_for_persons_name_no_program() -> None:
+    assert offenders(lambda page, text: NOT_FOR_PROGRAMS.findall(text)) == {}
 
 
-def test_parameters_exist(page: Path) -> None:
-    text = re.sub(r"\]\([^)]*\)", "]", page.read_text(encoding="utf-8"))  # but for links
-    unknown = []
-    for section, name in PARAMETER.findall(text):
-        owner = SECTIONS[section]
-        if name != "py" and isinstance(owner, BaseModel) and not hasattr(owner, name):
-            unknown.append(f"{section}.{name}")
-    assert unknown == []
+def test_parameters_exist() -> None:
+    def unknown(page: Path, text: str) -> Iterator[str]:
+        for section, name in PARAMETER.findall(re.sub(r"\]\([^)]*\)", "]", text)):  # no links
+            owner = SECTIONS[section]
+            if name != "py" and isinstance(owner, BaseModel) and not hasattr(owner, name):
+                yield f"{section}.{name}"
+
+    assert offenders(unknown) == {}
 
 
-def test_verbs_exist(page: Path) -> None:
-    verbs = re.findall(r"(?:^|`|bin/)airground\s([a-z]+)", page.read_text(encoding="utf-8"), re.M)
-    assert set(verbs) - set(VERBS) == set()
+def test_verbs_and_options_exist(capsys: pytest.CaptureFixture[str]) -> None:
+    known = {verb: options(verb, capsys) for verb in VERBS}
+
+    def unknown(page: Path, text: str) -> Iterator[str]:
+        for verb, words in COMMAND.findall(text):
+            if verb not in known:
+                yield verb
+                continue
+            for option in re.findall(r"(?<!\S)--[a-z0-9-]+", words):
+                if option not in known[verb]:
+                    yield f"{verb} {option}"
+
+    assert offenders(unknown) == {}
+
+
+def options(verb: str, capsys: pytest.CaptureFixture[str]) -> set[str]:
+    """The options in a verb's help."""
+    with pytest.raises(SystemExit):
+        parse(verb, ["--help"])
+    return set(re.findall(r"--[a-z0-9-]+", capsys.readouterr().out))
 
 
 def test_the_index_links_every_page() -> None:
