@@ -8,7 +8,6 @@ surface it is located in the ground robot's map, refined, and added to it. Track
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -24,11 +23,13 @@ from airground.core.events import (
     MapAugmented,
     MavTracked,
     PosesCorrected,
+    Sighted,
     SurfaceCast,
     TrackingLost,
 )
 from airground.core.messages import GroundImage, MavImage, RobotCalibration
 from airground.core.se3 import SE3
+from airground.core.sighting import Sighting
 from airground.core.surface import AerialSurface
 from airground.core.trajectory import Trajectory
 from airground.dense.reconstruction import DenseReconstruction
@@ -53,8 +54,8 @@ class Mapping:
         self._north: dict[Source, float | None] = {Source.MAV: None, Source.GROUND: None}
         self._correction: Trajectory | None = None
         self.ground_map: GroundMap | FixedMap = GroundMap(ground.camera, config.ground_mapping)
-        self.mav_pose: TrackedPose | None = None
-        self.ground_pose: TrackedPose | None = None
+        self._mav_pose: TrackedPose | None = None
+        self._ground_pose: TrackedPose | None = None
 
     def take(self, frame: TrackedFrame) -> Iterator[Event]:
         """Take in one frame; those of both robots come in order of time."""
@@ -89,8 +90,23 @@ class Mapping:
             return None
         return float(np.angle(np.exp(1j * (ground - mav))))
 
+    def sight(self, surface: AerialSurface) -> Sighting | None:
+        """Snapshot of both maps for a surface that was just cast; None while a robot is lost."""
+        mav, ground = self._mav_pose, self._ground_pose
+        if mav is None or mav.T_map_camera is None or ground is None or ground.T_map_camera is None:
+            return None
+        return Sighting(
+            surface,
+            self.ground_cloud(),
+            mav.stamp_ns,
+            mav.T_map_camera,
+            ground.stamp_ns,
+            ground.T_map_camera,
+            self.relative_heading(),
+        )
+
     def _take_mav_image(self, image: MavImage, pose: TrackedPose) -> Iterator[Event]:
-        self.mav_pose = pose
+        self._mav_pose = pose
         if pose.T_map_camera is None:
             yield _no_pose(pose, Source.MAV)
             return
@@ -100,7 +116,7 @@ class Mapping:
         yield from self._dense.add(image.stamp_ns, image.image, pose.T_map_camera, pose.depth_range)
 
     def _take_ground_image(self, image: GroundImage, pose: TrackedPose) -> Iterator[Event]:
-        self.ground_pose = pose
+        self._ground_pose = pose
         if pose.T_map_camera is None:
             yield _no_pose(pose, Source.GROUND)
             return
@@ -121,43 +137,6 @@ def _no_pose(pose: TrackedPose, robot: Source) -> Event:
 
 def _scale_sigma(pose: TrackedPose) -> float | None:
     return None if pose.scale is None else pose.scale.sigma
-
-
-@dataclass(frozen=True)
-class Sighting:
-    """All that locating one aerial surface needs; a snapshot of both maps at its time.
-
-    Attributes:
-        surface: What the MAV saw.
-        ground_cloud: The ground robot's map by then, in `ground`.
-        T_mav_camera: The MAV's camera when the surface became known, at `mav_stamp_ns`.
-        T_ground_camera: The ground robot's camera then, at `ground_stamp_ns`.
-        heading: Turn of `mav` in `ground` by the magnetometers [rad], None if unknown.
-    """
-
-    surface: AerialSurface
-    ground_cloud: PointCloud
-    mav_stamp_ns: int
-    T_mav_camera: SE3
-    ground_stamp_ns: int
-    T_ground_camera: SE3
-    heading: float | None
-
-
-def sight(surface: AerialSurface, mapping: Mapping) -> Sighting | None:
-    """The snapshot for a surface that was just cast; None while a robot is lost."""
-    mav, ground = mapping.mav_pose, mapping.ground_pose
-    if mav is None or mav.T_map_camera is None or ground is None or ground.T_map_camera is None:
-        return None
-    return Sighting(
-        surface,
-        mapping.ground_cloud(),
-        mav.stamp_ns,
-        mav.T_map_camera,
-        ground.stamp_ns,
-        ground.T_map_camera,
-        mapping.relative_heading(),
-    )
 
 
 class Pipeline:
@@ -201,12 +180,14 @@ class Pipeline:
     def _react(self, event: Event) -> Iterator[Event]:
         yield event
         if isinstance(event, SurfaceCast):
-            sighting = sight(event.surface, self.mapping)
+            sighting = self.mapping.sight(event.surface)
             if sighting is not None:
-                yield from self._locate_and_augment(sighting)
+                yield Sighted(event.stamp_ns, sighting)
+                yield from self.locate_and_augment(sighting)
 
-    def _locate_and_augment(self, sighting: Sighting) -> Iterator[Event]:
-        # Global localization (Sec. VI), unless somebody told where the MAV is.
+    def locate_and_augment(self, sighting: Sighting) -> Iterator[Event]:
+        """Localization, refinement and augmentation of one aerial surface."""
+        # Global localization (Sec. VI), unless a prior pose was given.
         if not self._has_prior:
             yield from locate(self._localizer, sighting)
             belief = self._localizer.belief

@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike
 from airground.config import Config, Localization, paper
 from airground.core.events import BeliefUpdated, DepthMapMade, Event, SurfaceCast
 from airground.core.se3 import SE3
+from airground.core.sighting import Sighting
 from airground.localization.particle_filter import MonteCarloLocalizer
-from airground.pipeline import Mapping, Sighting, locate, sight
+from airground.pipeline import Mapping, locate
 from airground.refinement import refine
 from airground.tracking import FrontEnds
 from tests.slam import bundle_problems
@@ -43,7 +44,7 @@ def mapped(recorded: Recorded) -> Iterator[tuple[str, Sighting | None]]:
         if isinstance(event, SurfaceCast):
             cloud = event.surface.cloud_mav
             line = f"surface {digest(event.surface.depth, cloud.points, cloud.normals)}"
-            yield line, sight(event.surface, mapping)
+            yield line, mapping.sight(event.surface)
     cloud = mapping.ground_cloud()
     yield f"ground map {digest(cloud.points, cloud.colours, cloud.normals)}", None
 

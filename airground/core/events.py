@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from airground.core.belief import Alignment, Belief, CostMap, HeightMap
 from airground.core.cloud import PointCloud, Source
 from airground.core.se3 import SE3
+from airground.core.sighting import Sighting
 from airground.core.surface import AerialSurface, DepthMap
 
 
@@ -119,6 +120,13 @@ class SurfaceCast(Event):
     """The fused surface was ray-cast into a point cloud (Sec. V)."""
 
     surface: AerialSurface
+
+
+@dataclass(frozen=True)
+class Sighted(Event):
+    """Both robots knew their poses when the surface was cast, so that it can be located."""
+
+    sighting: Sighting
 
 
 @dataclass(frozen=True)

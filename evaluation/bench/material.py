@@ -7,7 +7,6 @@ what the stages pass to each other is kept for one surface.
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -20,27 +19,28 @@ from airground.core.cloud import PointCloud, Source
 from airground.core.events import (
     Aligned,
     DepthMapMade,
-    Event,
     FieldAdded,
     FrameAdded,
     GroundTracked,
     MavTracked,
+    Sighted,
     SurfaceCast,
 )
 from airground.core.messages import GroundImage
 from airground.core.se3 import SE3
+from airground.core.sighting import Sighting
 from airground.core.surface import AerialSurface, DepthMap
 from airground.dense.view_selection import PosedImage
 from airground.errors import InputError
 from airground.ground_map import GroundMap
 from airground.ground_map.blocked_field import BlockedField
 from airground.io.recording import Recording
-from airground.pipeline import Pipeline, Sighting, sight
+from airground.pipeline import Pipeline
 from evaluation.bench.report import RealTime
-from evaluation.run.drops import nothing_dropped
-from evaluation.run.recording import pipeline_rng
-from evaluation.run.tracking import TrackingTask
-from evaluation.run.tracking_process import TrackingApart
+from evaluation.run.driver import drive, pipeline_for, watched
+from evaluation.run.onlooker import Seen
+from evaluation.run.tracking import TrackingTask, localizer_rng
+from evaluation.run.tracking_apart import TrackingApart
 from evaluation.setup.memory import AddedMemory, resident_mib
 from evaluation.setup.setups import Setup
 
@@ -131,31 +131,28 @@ def play(
     Raises:
         InputError: No aerial surface could be aligned: there is no material.
     """
-    with AddedMemory() as added:
-        task = TrackingTask(recording, None, Setup(config), 0, nothing_dropped(recording))
-        pipeline = Pipeline(
-            config, recording.mav.calibration, recording.ground.calibration, pipeline_rng(0)
-        )
-        gathering = _Gathering(recording, config, pipeline)
-        with TrackingApart(task) as tracking:
-            memory = MemoryLog(recording, tracking.pids)
+    setup = Setup(config)
+    pipeline = pipeline_for(recording, setup, localizer_rng(0, recording.flight))
+    gathering = _Gathering(recording, config, pipeline)
+    with AddedMemory() as added, TrackingApart(TrackingTask(recording, None, setup, 0)) as tracking:
+        if not whole:
             tracking.wait_until_ready()
-            started, cpu = time.perf_counter(), time.process_time()
-            for event in pipeline.run(tracking.frames()):
-                gathering.take(event)
-                memory.take(event)
-                if gathering.complete and not whole:
-                    return gathering.material(), None
-            report = tracking.report()
-            processing_s, cpu_s = time.perf_counter() - started, time.process_time() - cpu
-    frame_ms = {name: tracked.front_end.durations_ms for name, tracked in report.tracked.items()}
+            for seen in watched(pipeline, tracking.frames()):
+                gathering.see(seen)
+                if gathering.complete:
+                    break
+            return gathering.material(), None
+        memory = MemoryLog(recording, tracking.pids)
+        driven = drive(recording, tracking, pipeline, setup, [gathering, memory])
+    frame_ms = {name: tracked.front_end.durations_ms for name, tracked in driven.tracked.items()}
+    peak_mib = None if added.mib is None else added.mib + driven.tracking_memory_mib
     real_time = RealTime(
         threads=threads,
         recorded_s=recording.duration_s,
-        processing_s=processing_s,
-        cpu_s=cpu_s + report.processor_s,
-        real_time_factor=recording.duration_s / processing_s,
-        peak_memory_mib=None if added.mib is None else added.mib + report.peak_memory_mib,
+        processing_s=driven.processing_s,
+        cpu_s=driven.processor_s,
+        real_time_factor=recording.duration_s / driven.processing_s,
+        peak_memory_mib=peak_mib,
         resident_mib=tuple(memory.resident_mib),
     )
     return gathering.material(), Played(frame_ms, real_time)
@@ -180,9 +177,9 @@ class MemoryLog:
         self._waiting_ns = [int(end_ns) for end_ns in ends_ns]
         self.resident_mib: list[float] = []
 
-    def take(self, event: Event) -> None:
-        ground = isinstance(event, GroundTracked)
-        while ground and self._waiting_ns and event.stamp_ns >= self._waiting_ns[0]:
+    def see(self, seen: Seen) -> None:
+        ground = isinstance(seen.event, GroundTracked)
+        while ground and self._waiting_ns and seen.event.stamp_ns >= self._waiting_ns[0]:
             self._waiting_ns.pop(0)
             now_mib = resident_mib(self._processes)
             self.resident_mib += [] if now_mib is None else [now_mib]
@@ -201,6 +198,7 @@ class _Gathering:
     _views: dict[int, list[int]] = field(default_factory=dict)
     _made: dict[int, DepthMap] = field(default_factory=dict)
     _fused: list[DepthMap] = field(default_factory=list)
+    _of_surface: list[DepthMap] = field(default_factory=list)
     _latest: tuple[Sighting, list[DepthMap]] | None = None
 
     @property
@@ -215,9 +213,10 @@ class _Gathering:
             )
         return self.kept
 
-    def take(self, event: Event) -> None:
+    def see(self, seen: Seen) -> None:
         if self.complete:
             return
+        event = seen.event
         match event:
             case MavTracked():
                 self._poses[event.stamp_ns] = event.T_mav_camera
@@ -228,9 +227,9 @@ class _Gathering:
             case FieldAdded():
                 self._fused.append(self._made.pop(event.reference_stamp_ns))
             case SurfaceCast():
-                sighting = sight(event.surface, self.pipeline.mapping)
-                self._latest = (sighting, self._fused) if sighting is not None else None
-                self._fused = []
+                self._latest, self._of_surface, self._fused = None, self._fused, []
+            case Sighted():
+                self._latest = (event.sighting, self._of_surface)
             case Aligned() if event.alignment.accepted and self._latest is not None:
                 self._aligned += 1
                 self.kept = self._chosen(*self._latest, event.alignment.T_ground_mav)

@@ -14,21 +14,19 @@ from airground.core.events import (
     BeliefUpdated,
     CostMapComputed,
     DepthMapMade,
-    Event,
     FieldAdded,
     HeightMapsMade,
     SurfaceCast,
 )
 from airground.core.se3 import SE3
+from airground.core.sighting import Sighting
 from airground.core.surface import DepthMap
 from airground.core.trajectory import Trajectory
 from airground.io.recording import Recording
 from airground.localization.hypotheses import search_headings, search_positions
-from airground.pipeline import Pipeline, Sighting
 from airground.refinement import refine
 from evaluation.measure.baselines.matched_images import match_images
-from evaluation.measure.protocol.mapping_pass import Maps
-from evaluation.measure.protocol.trials import SEQUENCE_LENGTH, noisy_start, spread_evenly
+from evaluation.measure.protocol.trials import noisy_start, spread_evenly
 from evaluation.measure.showcase import LocalizationStep, Showcase
 from evaluation.run.onlooker import Seen
 from evaluation.setup.setups import Setup
@@ -188,26 +186,3 @@ def _path(tracked: Tracked, T_ground_map: SE3) -> Trajectory:
     return Trajectory.from_poses(
         [stamp for stamp, _ in poses], [T_ground_map @ pose for _, pose in poses]
     )
-
-
-def make_showcase(
-    recording: Recording, truth: Truth, maps: Maps, setup: Setup, seed: int, match: bool = False
-) -> Showcase | None:
-    """A close-up of a mapping pass: its first sightings replayed through the pipeline.
-
-    To be replaced by a `CloseUp` among the onlookers once a mapping pass drives `Pipeline`.
-    """
-    if not maps.sightings:
-        return None
-    close_up = CloseUp(recording, truth, setup)
-    rng = np.random.default_rng([seed, 3])
-    pipeline = Pipeline(setup.config, recording.mav.calibration, recording.ground.calibration, rng)
-    for sighting, fused in zip(maps.sightings[:SEQUENCE_LENGTH], maps.depth_maps, strict=False):
-        surface = sighting.surface
-        events: list[Event] = [DepthMapMade(surface.stamp_ns, made) for made in fused]
-        events += [FieldAdded(surface.stamp_ns, made.stamp_ns) for made in fused]
-        events += [SurfaceCast(surface.stamp_ns, surface)]
-        for event in [*events, *pipeline._locate_and_augment(sighting)]:
-            close_up.see(Seen(event, 0.0, None, sighting))  # type: ignore[arg-type]
-    augmented = pipeline._augmentation.map(maps.sightings[-1].ground_cloud)
-    return close_up.showcase(maps.tracked, augmented, seed if match else None)

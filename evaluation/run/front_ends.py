@@ -1,4 +1,4 @@
-"""Who says where the cameras are, as a setup wants it."""
+"""The front ends of both robots under a setup: SLAM, an oracle, or a trajectory file."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from airground.core.cloud import Source
 from airground.core.messages import GroundImage, MavImage
 from airground.io.recording import Recording
+from airground.io.robot_recording import Pair
 from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
 from airground.tracking import FrontEnds
 from evaluation.setup.setups import Setup
@@ -23,11 +24,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class WatchedFrontEnds:
-    """The front ends of both robots.
+    """The front ends of both robots, with a log of their answers.
 
     Attributes:
-        mav, ground: They.
-        slam: Those robots ("mav", "ground") whose front end is SLAM.
+        mav, ground: Front end of each robot.
+        slam: Robots ("mav", "ground") whose front end is SLAM.
     """
 
     mav: WatchedFrontEnd[MavImage]
@@ -35,34 +36,34 @@ class WatchedFrontEnds:
     slam: frozenset[str]
 
     def front_ends(self) -> FrontEnds:
-        """As the pipeline takes them."""
+        """In the form that trackers take."""
         return FrontEnds(self.mav, self.ground)
 
     def of(self, robot: Source) -> WatchedFrontEnd[Any]:
-        """One of them."""
+        """The front end of one robot."""
         return self.mav if robot == Source.MAV else self.ground
 
     def tracked(self) -> dict[str, Tracked]:
-        """What they said, by robot; to be asked at the end."""
+        """Answers and final trajectories, by robot; to be called at the end."""
         tracked = [self.tracked_by(robot) for robot in (Source.MAV, Source.GROUND)]
         return {one.robot: one for one in tracked}
 
     def tracked_by(self, robot: Source) -> Tracked:
-        """What one of them said; to be asked at the end."""
+        """Answers and final trajectory of one robot; to be called at the end."""
         one, name = self.of(robot), robot.name.lower()
         return Tracked(name, one, one.trajectory(), name in self.slam)
 
 
 def front_ends_for(
-    setup: Setup, recording: Recording, truth: Truth | None, rng: np.random.Generator
+    setup: Setup, recording: Pair, truth: Truth | None, rng: np.random.Generator
 ) -> WatchedFrontEnds:
     """The front ends of a setup: SLAM, an oracle, or a file, for each robot.
 
     Args:
-        setup: Says which.
-        recording: Its calibrations and stamps are used, as they are told.
-        truth: For oracles; None where the setup has none.
-        rng: Draws the oracles' errors and SLAM's samples.
+        setup: Choice of the front ends.
+        recording: Source of the nominal calibrations.
+        truth: Source of the oracles' poses; None where the setup has no oracle.
+        rng: Source of the oracles' errors and SLAM's samples.
     """
     way, given = setup.front_ends(), setup.given
     oracles = _oracles(setup, recording, truth, rng)
@@ -70,24 +71,25 @@ def front_ends_for(
     if oracles and way["mav"] == "oracle":
         mav = oracles.mav
     else:
-        needs = Ingredients(recording.mav.calibration, setup.config, mav_rng, given.mav)
+        calibration = recording.mav.calibration
+        needs = Ingredients(calibration, setup.config, mav_rng, given.mav)
         mav = make_front_end(MAV, way["mav"], needs)
     if oracles and way["ground"] == "oracle":
         ground = oracles.ground
     else:
         needs = Ingredients(recording.ground.calibration, setup.config, ground_rng, given.ground)
         ground = make_front_end(GROUND, way["ground"], needs)
-    # They track in one thread, which waits where another process has more right to the core.
+    # Thread time: waits for a core that another process holds do not count.
     clock = time.thread_time
     watched = WatchedFrontEnd(mav, clock), WatchedFrontEnd(ground, clock)
     return WatchedFrontEnds(*watched, setup.slam_robots())
 
 
 def truth_for(setup: Setup, recording: Path) -> Truth | None:
-    """The truth that oracles need; None where the setup has none.
+    """The truth of a recording; None where the setup has no oracle.
 
     Raises:
-        AirgroundError: It is not there or damaged.
+        AirgroundError: The truth is missing or damaged.
     """
     if not setup.needs_truth():
         return None
@@ -97,14 +99,15 @@ def truth_for(setup: Setup, recording: Path) -> Truth | None:
 
 
 def _oracles(
-    setup: Setup, recording: Recording, truth: Truth | None, rng: np.random.Generator
+    setup: Setup, recording: Pair, truth: Truth | None, rng: np.random.Generator
 ) -> FrontEnds | None:
-    """Of both robots, where any is needed."""
+    """Oracles of both robots; None where the setup has none."""
     if not setup.needs_truth():
-        rng.spawn(2)  # as oracles would: whoever draws next draws the same
+        rng.spawn(2)  # as oracles do, so that later draws are the same
         return None
-    # Open3D and MuJoCo come along: who only tracks does without them and their 200 MiB.
+    # Imports Open3D and MuJoCo: 200 MiB that tracking processes do not need.
     from evaluation.table.oracle import oracle_front_ends
 
     assert truth is not None
+    assert isinstance(recording, Recording)
     return oracle_front_ends(recording, truth, setup.noise, rng)

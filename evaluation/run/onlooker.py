@@ -1,9 +1,13 @@
-"""Events of a run as others see them: timed from outside, and passed to onlookers."""
+"""Events of a run as consumers see them: timed from outside, with their circumstances.
+
+Every stage yields one event when it is done, so the time between asking for the next event and
+getting it is the duration of that stage.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -21,61 +25,8 @@ from airground.core.events import (
     SurfaceCast,
     VolumeFused,
 )
-from airground.pipeline import Sighting
+from airground.core.sighting import Sighting
 from airground.tracking import TrackedFrame
-
-
-@dataclass(frozen=True, eq=False)
-class Seen:
-    """One event, and what it came from.
-
-    Attributes:
-        event: What happened.
-        duration_ms: How long it took; of an event that says how an image was tracked, the
-            wait for it.
-        frame: The newest image that was tracked, with its pose.
-        sighting: The newest aerial surface, with what both robots knew then; None before the
-            first, and while a robot is lost.
-    """
-
-    event: Event
-    duration_ms: float
-    frame: TrackedFrame
-    sighting: Sighting | None
-
-
-class Onlooker(Protocol):
-    """Watches a run."""
-
-    def see(self, seen: Seen) -> None:
-        """Take in one event; called in the order in which they happen."""
-
-
-class Audience:
-    """All who watch a run.
-
-    Args:
-        onlookers: They see every event, in this order.
-    """
-
-    def __init__(self, onlookers: Sequence[Onlooker]) -> None:
-        self._onlookers = onlookers
-        self._frame: TrackedFrame | None = None
-
-    def __bool__(self) -> bool:
-        return bool(self._onlookers)
-
-    def noted(self, frames: Iterable[TrackedFrame]) -> Iterator[TrackedFrame]:
-        """The frames as they go by."""
-        for self._frame in frames:
-            yield self._frame
-
-    def show(self, event: Event, duration_ms: float, sighting: Sighting | None) -> None:
-        """Let everyone see an event of the newest frame, while no stage runs."""
-        assert self._frame is not None
-        for onlooker in self._onlookers:
-            onlooker.see(Seen(event, duration_ms, self._frame, sighting))
-
 
 STAGE_OF: dict[type[Event], str] = {
     FrameAdded: "add_frame",
@@ -90,7 +41,32 @@ STAGE_OF: dict[type[Event], str] = {
     MapAugmented: "augmentation",
     GroundMapExtended: "ground_map",
 }
-"""Names of the timed stages. An oracle's tracking costs nothing worth reporting."""
+"""Names of the timed stages."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """One event with its circumstances.
+
+    Attributes:
+        event: The event.
+        duration_ms: Time that the event took [ms]; for events of tracking, the wait for it.
+        frame: The newest tracked image.
+        sighting: The newest aerial surface with both maps at its time; None before the first,
+            and where a robot was lost when the newest surface was cast.
+    """
+
+    event: Event
+    duration_ms: float
+    frame: TrackedFrame
+    sighting: Sighting | None
+
+
+class Onlooker(Protocol):
+    """A consumer of a run's events. It changes nothing in the run."""
+
+    def see(self, seen: Seen) -> None:
+        """Take in one event, while no stage runs; called in order of the events."""
 
 
 def timed(events: Iterable[Event]) -> Iterator[tuple[Event, float]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -21,43 +21,43 @@ from airground.errors import InputError
 from airground.io.ply import write_ply
 from airground.io.robot_recording import Pair
 from airground.io.tum import write_tum
-from airground.pipeline import Pipeline, sight
-from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
-from airground.tracking import FrontEnds, Trackers
-from airground.warm_up import warm_up
 from evaluation.run.alone import error_against, of_pose_frame
-from evaluation.run.given_map import enter
-from evaluation.run.onlooker import Audience, Onlooker, timed
-from evaluation.run.recording import pipeline_rng
-from evaluation.run.tracking import front_end_rng
+from evaluation.run.driver import drive, pipeline_for
+from evaluation.run.onlooker import Onlooker, Seen
+from evaluation.run.tracking import TrackingHere, TrackingTask, localizer_rng
 from evaluation.setup.checked_json import number
-from evaluation.setup.progress import step
 from evaluation.setup.setups import Setup
 from evaluation.setup.text import percent, seconds
 from evaluation.table.tracked_share import tracked_share_of
-from evaluation.table.tracking_log import Tracked, WatchedFrontEnd
+from evaluation.table.tracking_log import Tracked
 from evaluation.table.true_camera import true_camera
 
 ROBOTS = {Source.MAV: "mav", Source.GROUND: "ground"}
 
 
-@dataclass(frozen=True, eq=False)
-class PairResult:
-    """What a run leaves.
+@dataclass(eq=False)
+class PairEvents:
+    """An onlooker that keeps what a run without truth reports.
 
     Attributes:
-        tracked: What the front ends said.
-        augmented: The augmented map.
-        surfaces: How many aerial surfaces were made.
-        converged: After how many of them a position was claimed.
+        surfaces: Number of aerial surfaces.
+        located: Number of aerial surfaces after which a position was claimed.
         alignments: Every refinement, in order of time.
     """
 
-    tracked: dict[Source, Tracked]
-    augmented: AugmentedMap
-    surfaces: int
-    converged: int
-    alignments: list[Alignment]
+    surfaces: int = 0
+    located: int = 0
+    alignments: list[Alignment] = field(default_factory=list)
+
+    def see(self, seen: Seen) -> None:
+        """Count one event."""
+        match seen.event:
+            case SurfaceCast():
+                self.surfaces += 1
+            case BeliefUpdated(belief=belief):
+                self.located += belief.converged
+            case Aligned(alignment=alignment):
+                self.alignments.append(alignment)
 
     def accepted(self) -> Trajectory | None:
         """`T_ground_mav` of the accepted alignments, by the stamps of their surfaces."""
@@ -68,51 +68,41 @@ class PairResult:
         return Trajectory.from_poses([alignment.stamp_ns for alignment in accepted], poses)
 
 
+@dataclass(frozen=True, eq=False)
+class PairResult:
+    """What a run over two recordings of a user's own leaves.
+
+    Attributes:
+        tracked: Answers of the front ends, by robot ("mav", "ground").
+        augmented: The augmented map.
+        events: Surfaces, claims and alignments.
+    """
+
+    tracked: dict[str, Tracked]
+    augmented: AugmentedMap
+    events: PairEvents
+
+
 def run_pair(pair: Pair, setup: Setup, seed: int, onlookers: Sequence[Onlooker] = ()) -> PairResult:
     """Run the pipeline of Figure 4 from the first message to the last.
 
-    A recording of ours that was exported and comes back gives the same result as itself.
+    A recording of ours that was exported and is read as a pair gives the same result as itself.
 
     Args:
-        pair: What both robots sensed.
-        setup: How the pipeline is set.
-        seed: Of all that is random.
-        onlookers: They see every event.
+        pair: Measurements of both robots.
+        setup: Settings of the pipeline.
+        seed: Seed of all random numbers.
+        onlookers: Consumers of every event.
 
     Raises:
         InputError: The heading is to be known, but a robot has no magnetometer.
     """
     _check_heading(pair, setup)
-    front_ends = _front_ends(pair, setup, seed)
-    trackers = Trackers(pair.mav.calibration, pair.ground.calibration, FrontEnds(*front_ends))
-    pipeline = Pipeline(
-        setup.config, pair.mav.calibration, pair.ground.calibration, pipeline_rng(seed)
-    )
-    enter(setup.given, pipeline)
-    audience, sighting = Audience(onlookers), None
-    if audience:  # who is shown times, without those of compiling
-        warm_up(setup.config, np.random.default_rng(0))
-    surfaces = converged = 0
-    alignments = []
-    images = sum(len(pair.of(robot).camera_stamps) for robot in Source)
-    with step("running", images, "images") as running:
-        frames = running.along(audience.noted(trackers.frames(pair.messages())))
-        for event, duration_ms in timed(pipeline.run(frames)):
-            match event:
-                case SurfaceCast():
-                    surfaces += 1
-                    sighting = sight(event.surface, pipeline.mapping) if audience else None
-                case BeliefUpdated():
-                    converged += event.belief.converged
-                case Aligned():
-                    alignments.append(event.alignment)
-            audience.show(event, duration_ms, sighting)
-    pipeline.mapping.correct_ground(trackers.finish())
-    tracked = {
-        robot: Tracked(ROBOTS[robot], one, one.trajectory(), ROBOTS[robot] in setup.slam_robots())
-        for robot, one in zip((Source.MAV, Source.GROUND), front_ends, strict=True)
-    }
-    return PairResult(tracked, pipeline.augmented_map(), surfaces, converged, alignments)
+    tracking = TrackingHere(TrackingTask(pair, None, setup, seed))
+    pipeline = pipeline_for(pair, setup, localizer_rng(seed, flight=0))
+    events = PairEvents()
+    driven = drive(pair, tracking, pipeline, setup, [events, *onlookers])
+    return PairResult(driven.tracked, pipeline.augmented_map(), events)
 
 
 def write_pair(folder: Path, pair: Pair, setup: Setup, result: PairResult) -> dict[str, Any]:
@@ -123,7 +113,8 @@ def write_pair(folder: Path, pair: Pair, setup: Setup, result: PairResult) -> di
     """
     augmented = result.augmented
     write_ply(folder / "augmented_map.ply", augmented.cloud_ground, augmented.sources)
-    accepted = result.accepted()
+    events = result.events
+    accepted = events.accepted()
     if accepted is not None:
         write_tum(folder / "T_ground_mav.tum", accepted)
     summary = {
@@ -131,15 +122,15 @@ def write_pair(folder: Path, pair: Pair, setup: Setup, result: PairResult) -> di
         "version": 1,
         "preset": setup.config.preset,
         "replaced": setup.given.describe(),
-        "aerial_surfaces": result.surfaces,
-        "located": result.converged,
-        "alignments": len(result.alignments),
+        "aerial_surfaces": events.surfaces,
+        "located": events.located,
+        "alignments": len(events.alignments),
         "accepted": 0 if accepted is None else len(accepted),
         "map_points": {
             name: int((augmented.sources == robot).sum()) for robot, name in ROBOTS.items()
         },
         "robots": {
-            name: _robot(folder, pair, robot, result.tracked[robot])
+            name: _robot(folder, pair, robot, result.tracked[name])
             for robot, name in ROBOTS.items()
         },
     }
@@ -168,20 +159,6 @@ def print_pair(summary: dict[str, Any], console: Console | None = None) -> None:
         rms = "truth unknown" if error is None else f"{100 * error['ate_se3_rmse_m']:.2f} cm"
         shown.add_row(f"{name}: RMS after SE3", rms)
     (console or Console()).print(shown)
-
-
-def _front_ends(pair: Pair, setup: Setup, seed: int) -> tuple[WatchedFrontEnd, WatchedFrontEnd]:
-    rng = front_end_rng(seed)
-    # As in `front_ends_for`, where oracles take the first two: the same seed, the same result.
-    _, (mav_rng, ground_rng) = rng.spawn(2), rng.spawn(2)
-    given, config = setup.given, setup.config
-    for_mav = Ingredients(pair.mav.calibration, config, mav_rng, given.mav)
-    for_ground = Ingredients(pair.ground.calibration, config, ground_rng, given.ground)
-    names = {robot: "file" if robot in given.robots() else "slam" for robot in ROBOTS.values()}
-    return (
-        WatchedFrontEnd(make_front_end(MAV, names["mav"], for_mav)),
-        WatchedFrontEnd(make_front_end(GROUND, names["ground"], for_ground)),
-    )
 
 
 def _check_heading(pair: Pair, setup: Setup) -> None:

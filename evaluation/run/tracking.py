@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from airground.core.messages import Stamped
 from airground.core.trajectory import Trajectory
 from airground.core.work_ahead import run_ahead
-from airground.io.recording import Recording
+from airground.io.robot_recording import Pair
 from airground.slam.warm_up import warm_up_slam
 from airground.tracking import TrackedFrame, Trackers
 from evaluation.run.drops import DropList
@@ -22,37 +23,45 @@ if TYPE_CHECKING:
     from sim.recording.truth import Truth
 
 FRAMES_AHEAD = 30
-"""Tracked frames of a robot that may wait for mapping: those of a second at 30 Hz."""
+"""Tracked frames of a robot that may wait for mapping: one second at 30 Hz."""
 
 
 @dataclass(frozen=True)
 class TrackingTask:
-    """What is to be tracked, and by whom.
+    """One pass of tracking.
 
     Attributes:
-        recording: What both robots sensed.
-        truth: Makes the poses of oracles; None where the setup has none.
-        setup: Says who tracks.
-        seed: Of all that is random.
-        drops: Which images to do without.
+        recording: Recordings of both robots.
+        truth: Source of the oracles' poses; None where the setup has no oracle.
+        setup: Choice of the front ends.
+        seed: Seed of the front ends.
+        drops: Images that do not reach tracking or mapping; None drops nothing.
     """
 
-    recording: Recording
+    recording: Pair
     truth: Truth | None
     setup: Setup
     seed: int
-    drops: DropList
+    drops: DropList | None = None
+
+    def messages(self) -> Iterator[Stamped]:
+        """Messages that reach the trackers."""
+        return self.recording.messages(self.drops.dropped.by_robot() if self.drops else {})
+
+    def received(self, frames: Iterator[TrackedFrame]) -> Iterator[TrackedFrame]:
+        """Tracked frames that reach the mapper, as they reach it."""
+        return frames if self.drops is None else self.drops.received(frames)
 
 
 @dataclass(frozen=True)
 class TrackingReport:
-    """What is known when all is tracked.
+    """Outcome of tracking, once all images are tracked.
 
     Attributes:
-        tracked: What the front ends said, by robot ("mav", "ground").
-        ground: The ground robot's path as believed at last; None where it has none.
-        processor_s, peak_memory_mib: Of tracking in processes of its own, without what they share
-            with mapping; else 0.
+        tracked: Answers of the front ends, by robot ("mav", "ground").
+        ground: The ground robot's final trajectory; None where it has none.
+        processor_s: Processor time of processes of their own [s]; 0 in this process.
+        peak_memory_mib: Peak memory of such processes, without what they share with mapping.
     """
 
     tracked: dict[str, Tracked]
@@ -62,45 +71,42 @@ class TrackingReport:
 
 
 class Tracking(Protocol):
-    """Tracks both robots; tracking hears nothing of mapping, and so may run ahead of it."""
+    """Tracks both robots. It never waits for an answer of mapping, so it may run ahead."""
 
     def wait_until_ready(self) -> None:
-        """Until everything is compiled."""
+        """Returns when everything is compiled."""
 
     def frames(self) -> Iterator[TrackedFrame]:
-        """Every image's frame, in order of time."""
+        """Every image's frame that reaches the mapper, in order of time."""
 
     def report(self) -> TrackingReport:
-        """To be asked when there are no more frames."""
+        """The outcome; to be called after the last frame."""
 
 
 class TrackingHere:
-    """Tracks in this process, in a thread that runs ahead.
+    """Tracks in this process.
 
     Args:
-        task: What to do.
+        task: Recording, front ends, seed and drops.
+        ahead: Frames that a thread of its own may track ahead of mapping. With 0 each frame is
+            tracked when it is asked for, so that no stage is timed beside other work.
     """
 
-    def __init__(self, task: TrackingTask) -> None:
-        recording = task.recording
-        self._messages = recording.messages(task.drops.dropped.by_robot())
+    def __init__(self, task: TrackingTask, ahead: int = 2 * FRAMES_AHEAD) -> None:
+        self._task, self._ahead = task, ahead
         rng = front_end_rng(task.seed)
-        self._watched = front_ends_for(task.setup, recording, task.truth, rng)
-        self._trackers = Trackers(
-            recording.mav.calibration, recording.ground.calibration, self._watched.front_ends()
-        )
+        self._watched = front_ends_for(task.setup, task.recording, task.truth, rng)
+        mav, ground = task.recording.mav, task.recording.ground
+        self._trackers = Trackers(mav.calibration, ground.calibration, self._watched.front_ends())
 
     def wait_until_ready(self) -> None:
-        """Compile."""
+        """As `Tracking.wait_until_ready`."""
         warm_up_slam(np.random.default_rng(0))
 
     def frames(self) -> Iterator[TrackedFrame]:
         """As `Tracking.frames`."""
-        yield from run_ahead(self.in_turn(), 2 * FRAMES_AHEAD)
-
-    def in_turn(self) -> Iterator[TrackedFrame]:
-        """Frames as they are asked for, none ahead."""
-        return self._trackers.frames(self._messages)
+        frames = self._trackers.frames(self._task.messages())
+        return self._task.received(run_ahead(frames, self._ahead) if self._ahead else frames)
 
     def report(self) -> TrackingReport:
         """As `Tracking.report`."""
@@ -109,5 +115,17 @@ class TrackingHere:
 
 
 def front_end_rng(seed: int) -> np.random.Generator:
-    """Draws what the front ends need; the pipeline has a generator of its own."""
-    return np.random.default_rng(seed).spawn(2)[0]
+    """Source of the front ends' random numbers: the same for a run and for the protocol."""
+    return np.random.default_rng([seed, 0])
+
+
+def localizer_rng(seed: int, flight: int, sequence: int = 0) -> np.random.Generator:
+    """Source of the particles' random numbers.
+
+    Args:
+        seed: Seed of the run.
+        flight: Number of the flight over its scene.
+        sequence: 0 for the pipeline's own localization, from 1 on for sequences that repeat the
+            pipeline's sightings from a later start.
+    """
+    return np.random.default_rng([seed, flight, 1, sequence])

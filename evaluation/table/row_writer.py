@@ -61,8 +61,17 @@ class RowWriter:
         squared_mahalanobis: float,
         sequence: int,
         iteration: int,
+        origin: str = "",
     ) -> None:
-        """What a filter says after one aerial map, and how far off it is (Fig. 11, 12)."""
+        """A filter's belief after one aerial map, and its error (Fig. 11, 12).
+
+        Args:
+            belief: Belief of the filter.
+            error: Its error against the truth.
+            squared_mahalanobis: The error in the measure of the belief's covariance.
+            sequence, iteration: Number of the sequence, and of the aerial map in it.
+            origin: How it was made, where not by the pipeline itself; note of the error's row.
+        """
         for metric, value, unit in (
             ("error_m", error.horizontal_m, "m"),
             ("error_deg", error.rotation_deg, "deg"),
@@ -70,7 +79,7 @@ class RowWriter:
             ("squared_mahalanobis", squared_mahalanobis, ""),
             ("converged", belief.converged, ""),
         ):
-            note = belief.refusal if metric == "converged" else ""
+            note = {"converged": belief.refusal, "error_m": origin}.get(metric, "")
             self.add(
                 "localization",
                 metric,
@@ -100,14 +109,17 @@ class RowWriter:
             )
 
     def add_alignment(
-        self, alignment: Alignment, errors: dict[str, PoseError], duration_ms: float, trial: int
+        self,
+        alignment: Alignment,
+        errors: dict[str, PoseError],
+        trial: int,
+        stage: str = "refinement",
     ) -> None:
-        """A refinement (Fig. 13, 14): errors by when, "before" and "after" among them."""
+        """A refinement (Fig. 13, 14): errors by time, "before" and "after" among them."""
         for when, error in errors.items():
             metric = f"{when}_translation_m"
-            self.add("refinement", metric, error.translation_m, "m", trial=trial)
+            self.add(stage, metric, error.translation_m, "m", trial=trial)
             metric = f"{when}_rotation_deg"
-            self.add("refinement", metric, error.rotation_deg, "deg", trial=trial)
+            self.add(stage, metric, error.rotation_deg, "deg", trial=trial)
         accepted, refusal = alignment.accepted, alignment.refusal
-        self.add("refinement", "accepted", accepted, "", trial=trial, note=refusal)
-        self.add("timing", "icp", duration_ms, "ms", trial=trial)
+        self.add(stage, "accepted", accepted, "", trial=trial, note=refusal)

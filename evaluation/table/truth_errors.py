@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from airground.core.belief import Belief
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from airground.pipeline import Sighting
+from airground.core.sighting import Sighting
 from sim.recording.truth import Truth
 
 

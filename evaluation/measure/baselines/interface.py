@@ -13,7 +13,7 @@ from airground.config import Config
 from airground.core.arrays import read_only
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from airground.pipeline import Sighting
+from airground.core.sighting import Sighting
 
 
 @dataclass(frozen=True, eq=False)

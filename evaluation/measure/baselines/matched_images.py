@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from airground.core.arrays import read_only
 from airground.core.se3 import SE3
+from airground.core.sighting import Sighting
 from airground.io.recording import Recording
-from airground.pipeline import Sighting
 from evaluation.measure.baselines.feature_matching import asift_detector, locate_camera, matches_of
 from evaluation.measure.baselines.views import GroundViews, aerial_view
 

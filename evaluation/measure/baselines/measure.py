@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from airground.config import Config
+from airground.core.sighting import Sighting
 from airground.io.recording import Recording
-from airground.pipeline import Sighting
 from evaluation.measure.baselines.interface import Answer, Baseline, Given
 from evaluation.measure.baselines.table import BASELINES
 from evaluation.measure.baselines.views import GroundViews, aerial_view

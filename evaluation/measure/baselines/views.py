@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
+from airground.core.sighting import Sighting
 from airground.io.recording import Recording
-from airground.pipeline import Sighting
 from evaluation.measure.baselines.interface import View
 
 VIEWS = 3

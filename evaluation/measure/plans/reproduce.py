@@ -9,33 +9,17 @@ from pathlib import Path
 from types import MappingProxyType
 
 from evaluation.measure.protocol.trials import Protocol
-from evaluation.measure.showcase import Showcase
 from evaluation.measure.work.crew import Crew
 from evaluation.measure.work.measure import measure
 from evaluation.measure.work.recordings import recorded, recording_name
 from evaluation.measure.work.unit import Finished, Unit, UnitStore, grouped
 from evaluation.setup.setups import Setup
-from evaluation.table.rows import CONTROL_SCENES, SEQUENCE_KEYS, ResultTable
+from evaluation.table.rows import CONTROL_SCENES, SEQUENCE_KEYS
 from sim.recording.rendered import Flight
 from sim.scene import Scene
 from sim.sensors.presets import SensorPreset
 
 NOTHING: Mapping[str, Path] = MappingProxyType({})
-
-
-@dataclass(frozen=True)
-class Findings:
-    """Everything that was measured, and what pictures are drawn from."""
-
-    table: ResultTable
-    showcase: Showcase | None
-
-    @classmethod
-    def of(cls, finished: Sequence[Finished]) -> Findings:
-        """All units' rows in their order, and the first showcase among them."""
-        showcases = [unit.showcase for unit in finished if unit.showcase is not None]
-        table = ResultTable.concat([unit.table for unit in finished])
-        return cls(table, showcases[0] if showcases else None)
 
 
 @dataclass(frozen=True)
@@ -85,7 +69,7 @@ class Plan:
         """How many tasks the first flights make."""
         return len(grouped(unit for flight in self.first_flights() for unit in self.units(flight)))
 
-    def measured(self, recordings: Path | None, store: UnitStore, crew: Crew) -> Findings:
+    def measured(self, recordings: Path | None, store: UnitStore, crew: Crew) -> Finished:
         """Record and measure what is not there yet, flight after flight until there is enough.
 
         Which flights are flown depends on the plan and on what they gave, not on who flew them.
@@ -104,7 +88,7 @@ class Plan:
             if not flights:
                 break  # only control scenes
             flown += self._flown(flights, recordings, store, crew)
-        return Findings.of([unit for units in flown for unit in units])
+        return Finished.merged([unit for units in flown for unit in units])
 
     def stranger(self, flight: Flight) -> Flight | None:
         """Whose ground map is the wrong one for a flight: the same flight over the next scene.

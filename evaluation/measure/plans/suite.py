@@ -11,12 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from evaluation.measure.plans.reproduce import Findings
 from evaluation.measure.protocol.trials import Protocol
 from evaluation.measure.work.crew import Crew
 from evaluation.measure.work.measure import measure
 from evaluation.measure.work.recordings import recorded
-from evaluation.measure.work.unit import Unit, UnitStore
+from evaluation.measure.work.unit import Finished, Unit, UnitStore
 from evaluation.setup.setups import Setup
 from sim.recording.rendered import Flight
 from sim.scene import load_scene
@@ -93,7 +92,7 @@ class SuitePlan:
         """How many tasks they make."""
         return sum(flights.count for flights in self.suite.flights)
 
-    def measured(self, recordings: Path | None, store: UnitStore, crew: Crew) -> Findings:
+    def measured(self, recordings: Path | None, store: UnitStore, crew: Crew) -> Finished:
         """Record what is not there yet, and measure one setup.
 
         Args:
@@ -117,4 +116,4 @@ class SuitePlan:
             )
             for flight, recording in zip(flights, made, strict=True)
         ]
-        return Findings.of(measure(units, store, crew))
+        return Finished.merged(measure(units, store, crew))

@@ -12,9 +12,10 @@ from airground.config import Config
 from airground.core.cloud import PointCloud
 from airground.core.events import BeliefUpdated
 from airground.core.se3 import SE3
+from airground.core.sighting import Sighting
 from airground.io.recording import Recording
 from airground.localization.particle_filter import MonteCarloLocalizer
-from airground.pipeline import Sighting, locate
+from airground.pipeline import locate
 from airground.refinement import refine
 from evaluation.measure.protocol.mapping_pass import Maps, map_recording
 from evaluation.setup.setups import Poses, Setup
@@ -115,7 +116,7 @@ def add_error_budget(
     for stand_in in STAND_INS:
         if stand_in.poses not in mapped:
             exact = replace(setup, poses=stand_in.poses)
-            mapped[stand_in.poses] = map_recording(recording, truth, exact, seed[0])
+            mapped[stand_in.poses] = map_recording(recording, truth, exact, *seed)
         sightings = mapped[stand_in.poses].sightings
         rng = np.random.default_rng([*seed, 4])
         for trial, error in enumerate(final_errors(sightings, truth, setup.config, stand_in, rng)):

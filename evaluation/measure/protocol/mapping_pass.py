@@ -1,52 +1,163 @@
-"""One pass over a recording: both robots map, and every aerial surface becomes a sighting."""
+"""One pass of the pipeline over a recording, kept for the protocol.
+
+Sequences, trials, negative cases, baselines and pictures start from the sightings of this pass.
+The first sequence of a flight is the pipeline's own; all others repeat its sightings.
+"""
 
 from __future__ import annotations
 
-import time
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
-from airground.core.cloud import PointCloud, Source
+from airground.augmentation import AugmentedMap
+from airground.core.belief import Alignment, Belief
+from airground.core.cloud import PointCloud
 from airground.core.events import (
+    Aligned,
+    BeliefUpdated,
+    CostMapComputed,
     DepthMapMade,
     Event,
     FieldAdded,
+    HeightMapsMade,
+    MapAugmented,
+    Sighted,
     SurfaceCast,
 )
 from airground.core.se3 import SE3
+from airground.core.sighting import Sighting
 from airground.core.surface import DepthMap
 from airground.io.recording import Recording
-from airground.pipeline import Mapping, Sighting, sight
-from airground.tracking import TrackedFrame, Trackers
-from airground.warm_up import warm_up
-from evaluation.run.front_ends import front_ends_for
-from evaluation.run.onlooker import STAGE_OF, timed
-from evaluation.setup.environment import settle
+from evaluation.run.driver import drive, pipeline_for
+from evaluation.run.drops import SCHEMA, DropList, Stamps, fingerprint
+from evaluation.run.onlooker import STAGE_OF, Onlooker, Seen, timed
+from evaluation.run.tracking import TrackingHere, TrackingTask, localizer_rng
 from evaluation.setup.setups import Setup
 from evaluation.table.tracking_log import Tracked
 from sim.recording.truth import Truth
 
+LOCALIZATION = (HeightMapsMade, CostMapComputed, BeliefUpdated, Aligned, MapAugmented)
+"""Events after a sighting: setups that differ in these alone share their maps."""
+
+
+def _by_stage() -> dict[str, list[float]]:
+    return defaultdict(list)
+
+
+@dataclass
+class Localized:
+    """What the pipeline made of its sightings: beliefs and alignments.
+
+    Attributes:
+        beliefs: Belief after each sighting.
+        alignments: Alignment of each sighting; None where no position was claimed.
+        durations_ms: Durations of localization, refinement and augmentation, by stage [ms].
+    """
+
+    beliefs: list[Belief] = field(default_factory=list)
+    alignments: list[Alignment | None] = field(default_factory=list)
+    durations_ms: dict[str, list[float]] = field(default_factory=_by_stage)
+
+    def take(self, event: Event, duration_ms: float) -> None:
+        """Keep what one event after a sighting brings."""
+        if isinstance(event, LOCALIZATION):
+            self.durations_ms[STAGE_OF[type(event)]].append(duration_ms)
+        match event:
+            case BeliefUpdated():
+                self.beliefs.append(event.belief)
+                self.alignments.append(None)
+            case Aligned():
+                self.alignments[-1] = event.alignment
+
+    def total_s(self) -> float:
+        """Time of all stages together [s]."""
+        return 1e-3 * sum(sum(durations) for durations in self.durations_ms.values())
+
 
 @dataclass
 class Maps:
-    """What one pass left.
+    """What one pass left; an onlooker of that pass.
 
     Attributes:
-        sightings: In order of time, one an aerial surface.
+        sightings: One per aerial surface that could be located, in order of time.
         depth_maps: Of each sighting, the depth maps that were fused.
-        durations_ms: Of each timed stage.
-        tracked: What the front ends said, by robot ("mav", "ground").
-        processing_s: Wall time of the pass, decoding included.
+        localized: The pipeline's own beliefs and alignments.
+        durations_ms: Durations of the stages up to the surface, by stage [ms].
+        tracked: Answers of the front ends, by robot ("mav", "ground").
+        augmented: The augmented map at the end of the pass.
+        mapping_s: Wall time of the pass without localization, decoding included [s].
     """
 
     sightings: list[Sighting] = field(default_factory=list)
     depth_maps: list[list[DepthMap]] = field(default_factory=list)
-    durations_ms: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+    localized: Localized = field(default_factory=Localized)
+    durations_ms: dict[str, list[float]] = field(default_factory=_by_stage)
     tracked: dict[str, Tracked] = field(default_factory=dict)
-    processing_s: float = 0.0
+    augmented: AugmentedMap | None = None
+    mapping_s: float = 0.0
+    _made: dict[int, DepthMap] = field(default_factory=dict)
+    _fused: list[DepthMap] = field(default_factory=list)
+    _of_surface: list[DepthMap] = field(default_factory=list)
+
+    def see(self, seen: Seen) -> None:
+        """Keep what one event brings."""
+        event = seen.event
+        self.localized.take(event, seen.duration_ms)
+        if type(event) in STAGE_OF and not isinstance(event, LOCALIZATION):
+            self.durations_ms[STAGE_OF[type(event)]].append(seen.duration_ms)
+        match event:
+            case DepthMapMade():
+                self._made[event.depth_map.stamp_ns] = event.depth_map
+            case FieldAdded():
+                self._fused.append(self._made.pop(event.reference_stamp_ns))
+            case SurfaceCast():
+                self._of_surface, self._fused = self._fused, []
+            case Sighted():
+                self.sightings.append(event.sighting)
+                self.depth_maps.append(self._of_surface)
+
+
+def map_recording(
+    recording: Recording,
+    truth: Truth,
+    setup: Setup,
+    seed: int,
+    flight: int = 0,
+    onlookers: Sequence[Onlooker] = (),
+) -> Maps:
+    """Run the pipeline of Figure 4 over a whole recording, each frame tracked in turn.
+
+    Args:
+        recording: Measurements of both robots.
+        truth: Source of the oracles' poses.
+        setup: Settings of the pipeline.
+        seed, flight: Seed of the recording and number of its flight; they seed the pipeline.
+        onlookers: Further consumers of every event.
+    """
+    maps = Maps()
+    tracking = TrackingHere(TrackingTask(recording, truth, setup, seed), ahead=0)
+    pipeline = pipeline_for(recording, setup, localizer_rng(seed, flight))
+    driven = drive(recording, tracking, pipeline, setup, [maps, *onlookers])
+    maps.tracked, maps.augmented = driven.tracked, pipeline.augmented_map()
+    maps.mapping_s = driven.processing_s - maps.localized.total_s()
+    return maps
+
+
+def localize_again(
+    maps: Maps, recording: Recording, setup: Setup, seed: int, flight: int
+) -> Localized:
+    """What the pipeline makes of the same sightings under a setup with the same maps.
+
+    Its beliefs and alignments are those of a pass of its own (`map_recording`), since
+    localization does not act on the maps.
+    """
+    pipeline = pipeline_for(recording, setup, localizer_rng(seed, flight))
+    localized = Localized()
+    for sighting in maps.sightings:
+        for event, duration_ms in timed(pipeline.locate_and_augment(sighting)):
+            localized.take(event, duration_ms)
+    return localized
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,71 +166,28 @@ class GroundPass:
 
     Attributes:
         cloud_ground: Its map at the end.
-        T_ground_camera: Where its camera was at last.
+        T_ground_camera: Its last camera pose.
     """
 
     cloud_ground: PointCloud
     T_ground_camera: SE3
 
 
-def map_recording(recording: Recording, truth: Truth, setup: Setup, seed: int) -> Maps:
-    """Run the upper half of Figure 4 over a whole recording."""
-    rng = np.random.default_rng([seed, 0])
-    watched = front_ends_for(setup, recording, truth, rng)
-    trackers = Trackers(
-        recording.mav.calibration, recording.ground.calibration, watched.front_ends()
-    )
-    mapping = Mapping(setup.config, recording.mav.calibration, recording.ground.calibration)
-    maps = Maps()
-    made: dict[int, DepthMap] = {}
-    fused: list[DepthMap] = []
-    # Compiling is no part of what is timed.
-    warm_up(setup.config, np.random.default_rng(0))
-    settle()
-    started = time.perf_counter()
-    for event, duration_ms in timed(_events(trackers.frames(recording.messages()), mapping)):
-        if type(event) in STAGE_OF:
-            maps.durations_ms[STAGE_OF[type(event)]].append(duration_ms)
-        match event:
-            case DepthMapMade():
-                made[event.depth_map.stamp_ns] = event.depth_map
-            case FieldAdded():
-                fused.append(made.pop(event.reference_stamp_ns))
-            case SurfaceCast():
-                sighting = sight(event.surface, mapping)
-                if sighting is not None:
-                    maps.sightings.append(sighting)
-                    maps.depth_maps.append(fused)
-                fused = []
-    trackers.finish()
-    maps.processing_s = time.perf_counter() - started
-    maps.tracked = watched.tracked()
-    return maps
-
-
 def map_ground(recording: Recording, truth: Truth, setup: Setup, seed: int) -> GroundPass | None:
-    """Run the ground robot's part of Figure 4 over a whole recording.
+    """Run the pipeline over a recording without the MAV's images.
 
     Returns:
-        What it left, or None where the robot never knew where it was.
+        The ground robot's map, or None where the robot never had a pose.
     """
-    watched = front_ends_for(setup, recording, truth, np.random.default_rng([seed, 0]))
-    trackers = Trackers(
-        recording.mav.calibration, recording.ground.calibration, watched.front_ends()
+    no_aerial = DropList(
+        schema=SCHEMA,
+        recording=fingerprint(recording),
+        dropped=Stamps(mav=frozenset(recording.mav.camera_stamps.tolist())),
     )
-    mapping = Mapping(setup.config, recording.mav.calibration, recording.ground.calibration)
-    # The MAV sees nothing, and so costs nothing.
-    blind = {Source.MAV: recording.mav.camera_stamps.tolist()}
-    for _ in _events(trackers.frames(recording.messages(blind)), mapping):
-        pass
-    mapping.correct_ground(trackers.finish())
-    live = watched.ground.live_poses()
+    tracking = TrackingHere(TrackingTask(recording, truth, setup, seed, no_aerial), ahead=0)
+    pipeline = pipeline_for(recording, setup, localizer_rng(seed, recording.flight))
+    driven = drive(recording, tracking, pipeline, setup, [])
+    live = driven.tracked["ground"].front_end.live_poses()
     if not live:
         return None
-    return GroundPass(mapping.ground_cloud(), live[-1][1])
-
-
-def _events(frames: Iterable[TrackedFrame], mapping: Mapping) -> Iterator[Event]:
-    for frame in frames:
-        yield from mapping.take(frame)
-    yield from mapping.flush()
+    return GroundPass(pipeline.mapping.ground_cloud(), live[-1][1])

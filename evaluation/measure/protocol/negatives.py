@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from airground.config import Config
 from airground.core.belief import Alignment
 from airground.core.cloud import PointCloud
+from airground.core.sighting import Sighting
 from airground.localization.particle_filter import MonteCarloLocalizer
-from airground.pipeline import Sighting, locate
+from airground.pipeline import locate
 from airground.refinement import refine
 from evaluation.measure.protocol.mapping_pass import GroundPass, Maps
 from evaluation.measure.protocol.trials import (
@@ -94,10 +95,10 @@ def _add_case(
 ) -> None:
     length, iterations = protocol.sequence_length, Counter[int]()
     starts = sequence_starts(len(sightings), protocol.sequences, length)
-    filters = [
-        (start, np.random.default_rng([*seed, 6, case.number, sequence]))
+    filters = {
+        sequence: (start, np.random.default_rng([*seed, 6, case.number, sequence]))
         for sequence, start in enumerate(starts)
-    ]
+    }
     for sequence, _, _, step in localize_sequences(sightings, length, truth, config, filters):
         if step is not None:
             iterations[sequence] += 1

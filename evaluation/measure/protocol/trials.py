@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,9 +12,10 @@ from airground.config import Config
 from airground.core.belief import Alignment, Belief
 from airground.core.events import BeliefUpdated, CostMapComputed, Event, HeightMapsMade
 from airground.core.se3 import SE3
+from airground.core.sighting import Sighting
 from airground.localization.height_map_pair import HeightMapPair
 from airground.localization.particle_filter import MonteCarloLocalizer
-from airground.pipeline import Sighting, pair_of
+from airground.pipeline import pair_of
 from airground.refinement import refine
 from evaluation.run.onlooker import timed
 from evaluation.table.truth_errors import (
@@ -118,7 +119,7 @@ def localize_sequences(
     length: int,
     truth: Truth,
     config: Config,
-    filters: Sequence[tuple[int, np.random.Generator]],
+    filters: Mapping[int, tuple[int, np.random.Generator]],
 ) -> Iterator[tuple[int, Event, float | None, Iteration | None]]:
     """Run sequences that overlap side by side, each as `localize_sequence` would.
 
@@ -130,16 +131,18 @@ def localize_sequences(
         length: Sightings in a sequence.
         truth: Judges.
         config: Of all filters.
-        filters: Where each sequence begins, and its source of randomness.
+        filters: Start and source of randomness of each sequence, by its number.
 
     Yields:
         The number of the sequence, and its next event; its time [ms], None where another
         sequence had it computed; the iteration that it completes.
     """
-    localizers = [MonteCarloLocalizer(config, rng) for _, rng in filters]
+    localizers = {
+        sequence: MonteCarloLocalizer(config, rng) for sequence, (_, rng) in filters.items()
+    }
     for index, sighting in enumerate(sightings):
         pair, computed = pair_of(sighting, config), set[type[Event]]()
-        for sequence, (start, _) in enumerate(filters):
+        for sequence, (start, _) in filters.items():
             if start <= index < start + length:
                 steps = _taken_in(localizers[sequence], pair, sighting, truth)
                 for event, duration_ms, iteration in steps:

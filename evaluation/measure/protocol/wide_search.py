@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from airground.config import Config
 from airground.core.belief import CostMap
 from airground.core.events import CostMapComputed
-from airground.pipeline import Sighting
+from airground.core.sighting import Sighting
 from evaluation.measure.protocol.trials import localize_sequence, spread_evenly
 from evaluation.setup.setups import with_localization
 from evaluation.table.row_writer import RowWriter

@@ -1,23 +1,33 @@
-"""All that is measured on one recording: the surface, the sequences, the refinement trials."""
+"""All that is measured on one recording: the surface, the sequences, the refinement trials.
+
+One pass of the pipeline makes the sightings. Sequence 0 and the alignments are the pipeline's
+own. The other sequences and the refinement trials repeat its sightings: from a later start of
+the particle filter, or from a noisy start of refinement; their rows say so.
+"""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from airground.io.recording import Recording
 from evaluation.measure.baselines.measure import add_baselines
-from evaluation.measure.close_up import make_showcase
+from evaluation.measure.close_up import CloseUp
 from evaluation.measure.protocol.error_budget import add_error_budget
-from evaluation.measure.protocol.mapping_pass import GroundPass, Maps, map_ground, map_recording
+from evaluation.measure.protocol.mapping_pass import (
+    GroundPass,
+    Localized,
+    Maps,
+    localize_again,
+    map_ground,
+    map_recording,
+)
 from evaluation.measure.protocol.negatives import add_negatives
 from evaluation.measure.protocol.trials import (
-    Protocol,
     localize_sequences,
     refine_sighting,
     sequence_starts,
@@ -25,75 +35,55 @@ from evaluation.measure.protocol.trials import (
 )
 from evaluation.measure.protocol.wide_search import add_wide_searches
 from evaluation.measure.showcase import Showcase
+from evaluation.measure.work.unit import Finished, Unit
 from evaluation.run.onlooker import STAGE_OF
+from evaluation.run.tracking import localizer_rng
 from evaluation.setup.memory import peak_memory_mib
-from evaluation.setup.setups import Setup
 from evaluation.table.row_writer import RowWriter
-from evaluation.table.rows import Row
+from evaluation.table.rows import ResultTable
 from evaluation.table.tracking_quality import add_tracking
-from evaluation.table.truth_errors import surface_error
+from evaluation.table.truth_errors import (
+    pose_error,
+    squared_mahalanobis,
+    surface_error,
+)
 from sim.recording.rendered import Flight, rendered
 from sim.recording.truth import Truth
 
+REPEATED = "the pipeline's sightings, repeated from a later start"
 
-@dataclass(frozen=True)
-class Task:
-    """One recording and the setups that share their maps: the unit of parallel work.
 
-    Attributes:
-        recording: Where it is, or what it would be made from, to draw its images on the fly.
-        seed, flight: What it was made from; they seed the trials too.
-        setups: What to measure; all make the same maps.
-        protocol: How much of it.
-        showcase: Whether to gather what pictures need, of the first setup.
-        budget: Whether to measure what each stage loses, with the first setup.
+def measure_units(units: Sequence[Unit], renderers: int) -> list[Finished]:
+    """Measure units that share their maps.
+
+    Args:
+        units: Setups on one flight; extras are those of the first.
         renderers: Processes that draw images on the fly.
-        baselines: Whether to try the baselines on the first setup's maps.
-        negatives: Whether to try the negative cases, likewise.
-        stranger: The flight whose ground map is the wrong one there; None leaves that out.
     """
-
-    recording: Path | Flight
-    seed: int
-    flight: int
-    setups: list[Setup]
-    protocol: Protocol
-    showcase: bool = False
-    budget: bool = False
-    renderers: int = 1
-    baselines: bool = False
-    negatives: bool = False
-    stranger: Path | Flight | None = None
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What a task found.
-
-    Attributes:
-        parts: Its rows, by setup.
-        showcase: What pictures need, where it was asked for.
-    """
-
-    parts: list[list[Row]]
-    showcase: Showcase | None
-
-    @property
-    def rows(self) -> list[Row]:
-        """All rows, setup by setup."""
-        return [row for part in self.parts for row in part]
-
-
-def run_task(task: Task) -> Outcome:
-    """Measure everything that a task asks for."""
-    stranger = _stranger(task)
-    with _opened(task.recording, task.renderers) as recording:
-        return _measured(recording, task, stranger)
+    first = units[0]
+    stranger = None
+    if first.stranger is not None:
+        with _opened(first.stranger, renderers) as recording:
+            truth = Truth.open(recording.path)
+            stranger = map_ground(recording, truth, first.setup, first.seed)
+    with _opened(first.recording, renderers) as recording:
+        truth = Truth.open(recording.path)
+        close_up = CloseUp(recording, truth, first.setup)
+        onlookers = [close_up] if first.showcase else []
+        maps = map_recording(recording, truth, first.setup, first.seed, first.flight, onlookers)
+        tables = [
+            _measured(unit, recording, truth, maps, stranger, unit is first) for unit in units
+        ]
+        showcase = _showcase(close_up, maps, first) if first.showcase else None
+    return [
+        Finished(table, showcase if unit is first else None)
+        for unit, table in zip(units, tables, strict=True)
+    ]
 
 
 @contextmanager
 def _opened(recording: Path | Flight, renderers: int) -> Iterator[Recording]:
-    """From the disk, or drawn while it is read."""
+    """A recording from the disk, or one whose images are drawn while they are read."""
     if isinstance(recording, Flight):
         with rendered(recording, renderers) as drawn:
             yield drawn
@@ -101,50 +91,53 @@ def _opened(recording: Path | Flight, renderers: int) -> Iterator[Recording]:
         yield Recording.open(recording)
 
 
-def _stranger(task: Task) -> GroundPass | None:
-    """The map that is the wrong one for all of the task's sightings."""
-    if task.stranger is None:
-        return None
-    with _opened(task.stranger, task.renderers) as recording:
-        return map_ground(recording, Truth.open(recording.path), task.setups[0], task.seed)
+def _measured(
+    unit: Unit,
+    recording: Recording,
+    truth: Truth,
+    maps: Maps,
+    stranger: GroundPass | None,
+    is_first: bool,
+) -> ResultTable:
+    """What one unit asks for; the pass is that of the first unit's setup."""
+    setup, seed = unit.setup, (unit.seed, unit.flight)
+    config, protocol = setup.config, unit.protocol
+    localized = maps.localized
+    if not is_first:
+        localized = localize_again(maps, recording, setup, *seed)
+    out = RowWriter(recording.scene, *seed, setup.condition(recording.sensors))
+    _add_run(out, recording, maps, localized)
+    _add_trajectories(out, maps, truth)
+    _add_surfaces(out, maps, truth)
+    _add_alignments(out, maps, localized, truth)
+    _add_sequences(out, unit, maps, localized, truth)
+    _add_trials(out, unit, maps, truth)
+    add_wide_searches(out, maps.sightings, truth, config, seed, protocol.wide_searches)
+    if unit.budget:
+        add_error_budget(out, recording, truth, setup, maps, seed)
+    if unit.baselines and protocol.baselines:
+        counts = (protocol.trials, protocol.baselines)
+        add_baselines(out, recording, truth, config, maps, seed, counts)
+    if unit.negatives:
+        add_negatives(out, maps, stranger, truth, config, seed, protocol)
+    return ResultTable.from_rows(out.rows)
 
 
-def _measured(recording: Recording, task: Task, stranger: GroundPass | None) -> Outcome:
-    truth = Truth.open(recording.path)
-    maps = map_recording(recording, truth, task.setups[0], task.seed)
-    parts: list[list[Row]] = []
-    for setup in task.setups:
-        out = RowWriter(recording.scene, task.seed, task.flight, setup.condition(recording.sensors))
-        _add_run(out, recording, maps)
-        _add_trajectories(out, maps, truth)
-        _add_surfaces(out, maps, truth)
-        _add_sequences(out, maps, truth, setup, task)
-        _add_trials(out, maps, truth, setup, task)
-        seed = (task.seed, task.flight)
-        widely = task.protocol.wide_searches
-        add_wide_searches(out, maps.sightings, truth, setup.config, seed, widely)
-        if task.budget and setup is task.setups[0]:
-            add_error_budget(out, recording, truth, setup, maps, seed)
-        if task.baselines and task.protocol.baselines and setup is task.setups[0]:
-            counts = (task.protocol.trials, task.protocol.baselines)
-            add_baselines(out, recording, truth, setup.config, maps, seed, counts)
-        if task.negatives and setup is task.setups[0]:
-            add_negatives(out, maps, stranger, truth, setup.config, seed, task.protocol)
-        parts.append(out.rows)
-    showcase = None
-    if task.showcase:
-        match = task.baselines and task.protocol.baselines > 0
-        showcase = make_showcase(recording, truth, maps, task.setups[0], task.seed, match)
-    return Outcome(parts, showcase)
+def _showcase(close_up: CloseUp, maps: Maps, unit: Unit) -> Showcase | None:
+    """Data of the pictures, with matches of images where the baselines are asked."""
+    assert maps.augmented is not None
+    match = unit.baselines and unit.protocol.baselines > 0
+    return close_up.showcase(maps.tracked, maps.augmented, unit.seed if match else None)
 
 
-def _add_run(out: RowWriter, recording: Recording, maps: Maps) -> None:
+def _add_run(out: RowWriter, recording: Recording, maps: Maps, localized: Localized) -> None:
     out.add("run", "recorded_s", recording.duration_s, "s")
-    out.add("run", "processing_s", maps.processing_s, "s")
+    out.add("run", "processing_s", maps.mapping_s + localized.total_s(), "s")
     out.add("run", "peak_memory_mib", peak_memory_mib(), "MiB")
-    for stage, durations in maps.durations_ms.items():
-        for duration in durations:
-            out.add("timing", stage, duration, "ms")
+    for durations_ms in (maps.durations_ms, localized.durations_ms):
+        for stage, durations in durations_ms.items():
+            for duration in durations:
+                out.add("timing", stage, duration, "ms")
 
 
 def _add_trajectories(out: RowWriter, maps: Maps, truth: Truth) -> None:
@@ -163,30 +156,52 @@ def _add_surfaces(out: RowWriter, maps: Maps, truth: Truth) -> None:
         out.add("surface", "completeness", error.completeness, "", trial=index)
 
 
-def _add_sequences(out: RowWriter, maps: Maps, truth: Truth, setup: Setup, task: Task) -> None:
-    length = task.protocol.sequence_length
-    starts = sequence_starts(len(maps.sightings), task.protocol.sequences, length)
-    filters = [
-        (start, np.random.default_rng([task.seed, task.flight, 1, sequence]))
-        for sequence, start in enumerate(starts)
-    ]
+def _add_alignments(out: RowWriter, maps: Maps, localized: Localized, truth: Truth) -> None:
+    """The pipeline's own alignments, from where its particles put each aerial map."""
+    found = zip(maps.sightings, localized.beliefs, localized.alignments, strict=True)
+    for trial, (sighting, belief, alignment) in enumerate(found):
+        if alignment is not None:
+            poses = {"before": belief.T_ground_mav, "after": alignment.T_ground_mav}
+            errors = {when: pose_error(pose, sighting, truth) for when, pose in poses.items()}
+            out.add_alignment(alignment, errors, trial, stage="alignment")
+
+
+def _add_sequences(
+    out: RowWriter, unit: Unit, maps: Maps, localized: Localized, truth: Truth
+) -> None:
+    length = unit.protocol.sequence_length
+    starts = sequence_starts(len(maps.sightings), unit.protocol.sequences, length)
     iterations = Counter[int]()
-    steps = localize_sequences(maps.sightings, length, truth, setup.config, filters)
+    own = zip(maps.sightings[:length], localized.beliefs, strict=False)
+    for iteration, (sighting, belief) in enumerate(own, 1):
+        error = pose_error(belief.T_ground_mav, sighting, truth)
+        distance = squared_mahalanobis(belief, sighting, truth)
+        out.add_belief(belief, error, distance, 0, iteration)
+        iterations[0] = iteration
+    filters = {
+        sequence: (start, localizer_rng(unit.seed, unit.flight, sequence))
+        for sequence, start in enumerate(starts)
+        if sequence > 0
+    }
+    steps = localize_sequences(maps.sightings, length, truth, unit.setup.config, filters)
     for sequence, event, duration_ms, result in steps:
         if duration_ms is not None:
             out.add("timing", STAGE_OF[type(event)], duration_ms, "ms")
         if result is not None:
             iterations[sequence] += 1
             distance = result.squared_mahalanobis
-            out.add_belief(result.belief, result.error, distance, sequence, iterations[sequence])
-    for sequence in range(len(filters)):
+            out.add_belief(
+                result.belief, result.error, distance, sequence, iterations[sequence], REPEATED
+            )
+    for sequence in range(len(starts)):
         for missing in range(iterations[sequence] + 1, length + 1):
             out.add_no_belief("the flight gave no further aerial map", sequence, missing)
 
 
-def _add_trials(out: RowWriter, maps: Maps, truth: Truth, setup: Setup, task: Task) -> None:
-    chosen = trial_sightings(len(maps.sightings), task.protocol.trials)
+def _add_trials(out: RowWriter, unit: Unit, maps: Maps, truth: Truth) -> None:
+    chosen = trial_sightings(len(maps.sightings), unit.protocol.trials)
     for trial, index in enumerate(chosen):
-        rng = np.random.default_rng([task.seed, task.flight, 2, trial])
-        result = refine_sighting(maps.sightings[index], truth, setup.config, rng)
-        out.add_alignment(result.alignment, result.errors, result.duration_ms, trial)
+        rng = np.random.default_rng([unit.seed, unit.flight, 2, trial])
+        result = refine_sighting(maps.sightings[index], truth, unit.setup.config, rng)
+        out.add_alignment(result.alignment, result.errors, trial)
+        out.add("timing", "icp", result.duration_ms, "ms", trial=trial)

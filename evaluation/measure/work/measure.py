@@ -5,19 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from airground.errors import AirgroundError, InputError
+from airground.errors import InputError
 from evaluation.measure.work.code_version import code_version
 from evaluation.measure.work.crew import Crew
-from evaluation.measure.work.experiment import Outcome, Task, run_task
-from evaluation.measure.work.unit import Finished, Unit, UnitStore, grouped, task_of
+from evaluation.measure.work.experiment import measure_units
+from evaluation.measure.work.unit import Finished, Unit, UnitStore, grouped
 from evaluation.setup.progress import step
 
 
 @dataclass(frozen=True)
-class Sent:
-    """A task on its way to a worker, with the version of the code that must do it."""
+class Group:
+    """Units that share their maps, on their way to a worker.
 
-    task: Task
+    Attributes:
+        units: The units; extras are those of the first.
+        renderers: Processes that draw images on the fly.
+        code: Version of the code that must measure them.
+    """
+
+    units: list[Unit]
+    renderers: int
     code: str
 
 
@@ -41,34 +48,25 @@ def measure(units: Sequence[Unit], store: UnitStore, crew: Crew) -> list[Finishe
     missing = {key: unit for key, unit in zip(keys, units, strict=True) if key not in store}
     groups = grouped(missing.values())
     cores = crew.share(len(groups))
-    sent = [Sent(task_of(group, cores), code_version()) for group in groups]
+    sent = [Group(group, cores, code_version()) for group in groups]
     count = len(set(keys))
     with step("measuring", count, "units", done=count - len(missing)) as measuring:
         for index, outcome in crew.outcomes(work, sent):
             if isinstance(outcome, Refused):
                 raise InputError(outcome.reason)
-            _keep(groups[index], outcome, store)
+            for unit, finished in zip(groups[index], outcome, strict=True):
+                store.write(unit.key(), unit.made_from(), finished)
             measuring.advance(len(groups[index]))
     return [store.read(key) for key in keys]
 
 
-def work(sent: Sent) -> Outcome | Refused:
-    """Do a task; called in a worker."""
-    if code_version() != sent.code:
+def work(group: Group) -> list[Finished] | Refused:
+    """Measure a group; called in a worker."""
+    if code_version() != group.code:
         return Refused(
             "a worker has other sources or libraries than this machine; install the same"
         )
     try:
-        return run_task(sent.task)
+        return measure_units(group.units, group.renderers)
     except InputError as error:
         return Refused(str(error))
-
-
-def _keep(group: list[Unit], outcome: Outcome, store: UnitStore) -> None:
-    """Write what was found of each unit; the showcase is that of the first."""
-    if len(outcome.parts) != len(group):
-        raise AirgroundError(f"{len(group)} setups were sent, {len(outcome.parts)} came back")
-    showcase = outcome.showcase
-    for unit, rows in zip(group, outcome.parts, strict=True):
-        store.write(unit.key(), unit.made_from(), rows, showcase)
-        showcase = None

@@ -6,7 +6,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -17,9 +17,8 @@ from airground.io.digests import bytes_digest, file_digest
 from evaluation.measure.protocol.trials import Protocol
 from evaluation.measure.showcase import Showcase
 from evaluation.measure.work.code_version import code_version
-from evaluation.measure.work.experiment import Task
 from evaluation.setup.setups import Setup
-from evaluation.table.rows import ResultTable, Row
+from evaluation.table.rows import ResultTable
 from sim.recording.rendered import Flight
 
 KEY_LENGTH = 32
@@ -84,7 +83,7 @@ class Unit:
 
     @property
     def has_extras(self) -> bool:
-        """Whether it asks for what a task does for the first of its setups alone."""
+        """Whether it asks for what is measured with the first unit of a group alone."""
         return self.showcase or self.budget or self.baselines or self.negatives
 
     def maps_like(self, other: Unit) -> bool:
@@ -104,7 +103,7 @@ def key_of(made_from: dict[str, Any]) -> str:
 def grouped(units: Iterable[Unit]) -> list[list[Unit]]:
     """Units that share their maps, together: drawing and mapping are the expensive part.
 
-    What a task does for its first setup alone puts a unit first in a group, or apart.
+    A unit with extras is the first of its group.
     """
     groups: list[list[Unit]] = []
     for unit in units:
@@ -115,24 +114,6 @@ def grouped(units: Iterable[Unit]) -> list[list[Unit]]:
         else:
             groups.append([unit])
     return groups
-
-
-def task_of(group: list[Unit], renderers: int) -> Task:
-    """The task that measures a group of `grouped`, images drawn by so many processes."""
-    first = group[0]
-    return Task(
-        first.recording,
-        first.seed,
-        first.flight,
-        [unit.setup for unit in group],
-        first.protocol,
-        showcase=first.showcase,
-        budget=first.budget,
-        renderers=renderers,
-        baselines=first.baselines,
-        negatives=first.negatives,
-        stranger=first.stranger,
-    )
 
 
 def _described(recording: Path | Flight) -> dict[str, Any]:
@@ -158,10 +139,22 @@ _PARTIAL = ".partial-"
 
 @dataclass(frozen=True)
 class Finished:
-    """What a unit found."""
+    """What was measured on a unit, or on several.
+
+    Attributes:
+        table: Its rows.
+        showcase: Data of the pictures, where it was asked for.
+    """
 
     table: ResultTable
-    showcase: Showcase | None
+    showcase: Showcase | None = None
+
+    @classmethod
+    def merged(cls, parts: Sequence[Finished]) -> Finished:
+        """All rows in the order of the parts, and the first showcase among them."""
+        showcases = [part.showcase for part in parts if part.showcase is not None]
+        table = ResultTable.concat([part.table for part in parts])
+        return cls(table, showcases[0] if showcases else None)
 
 
 class UnitStore:
@@ -194,9 +187,7 @@ class UnitStore:
             Showcase.load(showcase) if showcase.is_dir() else None,
         )
 
-    def write(
-        self, key: str, made_from: dict[str, Any], rows: Iterable[Row], showcase: Showcase | None
-    ) -> None:
+    def write(self, key: str, made_from: dict[str, Any], finished: Finished) -> None:
         """Keep what a unit found, for good once this returns.
 
         Raises:
@@ -204,11 +195,11 @@ class UnitStore:
         """
         partial = Path(tempfile.mkdtemp(prefix=_PARTIAL, dir=self._folder))
         try:
-            ResultTable.from_rows(rows).write(partial / ROWS)
+            finished.table.write(partial / ROWS)
             text = json.dumps(made_from, indent=2, sort_keys=True) + "\n"
             (partial / MADE_FROM).write_text(text, encoding="utf-8")
-            if showcase is not None:
-                showcase.save(partial / SHOWCASE)
+            if finished.showcase is not None:
+                finished.showcase.save(partial / SHOWCASE)
             for path in [*partial.rglob("*"), partial]:
                 _flush(path)
             partial.rename(self._folder / key)

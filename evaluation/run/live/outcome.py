@@ -9,7 +9,7 @@ from airground.core.cloud import Source
 from airground.io.recording import Recording
 from evaluation.run.drops import SCHEMA, DropList, Stamps, fingerprint
 from evaluation.run.live.playback import Playback, PlaybackClock
-from evaluation.run.live.processes import TrackerReport
+from evaluation.run.live.robot import RobotReport
 from evaluation.table.row_writer import RowWriter
 from evaluation.table.rows import LIVE_STAGE
 
@@ -31,7 +31,7 @@ class Lived:
     """
 
     clock: PlaybackClock
-    reports: dict[Source, TrackerReport | None] = field(default_factory=dict)
+    reports: dict[Source, RobotReport | None] = field(default_factory=dict)
     late_ns: dict[Source, list[int]] = field(default_factory=dict)
     mapped_ns: dict[Source, dict[int, int]] = field(
         default_factory=lambda: {robot: {} for robot in Source}
@@ -88,7 +88,7 @@ def add_live_rows(out: RowWriter, recording: Recording, lived: Lived, playback: 
     out.add(LIVE_STAGE, "mapper_peak_memory_mib", lived.peak_memory_mib, "MiB")
 
 
-def _add_report(out: RowWriter, name: str, report: TrackerReport, lived: Lived) -> None:
+def _add_report(out: RowWriter, name: str, report: RobotReport, lived: Lived) -> None:
     played = report.played
     _add_latencies(out, f"{name}_posed_ms", lived, played.posed_ns)
     for metric, value, unit in (

@@ -11,11 +11,12 @@ from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
 from airground.core.messages import GroundImage
 from airground.core.se3 import SE3
+from airground.core.sighting import Sighting
 from airground.core.surface import AerialSurface, DepthMap
 from airground.dense.view_selection import PosedImage
 from airground.ground_map import GroundMap
 from airground.io.recording import Recording
-from airground.pipeline import Sighting, moved
+from airground.pipeline import moved
 from evaluation.bench.material import Material
 from tests.dense.synthetic import DOWN, SMALL_CAMERA, World, flight, heap_world, noisy
 from tests.io.recordings import write_recording

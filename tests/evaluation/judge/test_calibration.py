@@ -14,7 +14,7 @@ from scipy.stats import binom, chi2
 
 from airground.core.belief import Belief
 from airground.core.se3 import SE3
-from airground.pipeline import Sighting
+from airground.core.sighting import Sighting
 from evaluation.judge.claims import ELLIPSES, METRIC, Localizations, localizations
 from evaluation.show.report.calibration import calibration_figures, calibration_table
 from evaluation.table.rows import ResultTable, Row

@@ -16,10 +16,10 @@ from airground.config import Config
 from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
+from airground.core.sighting import Sighting
 from airground.core.surface import AerialSurface
 from airground.localization import cost_map, height_map_pair
 from airground.localization.particle_filter import MonteCarloLocalizer
-from airground.pipeline import Sighting
 from evaluation.judge.measured import Measured
 from evaluation.judge.verdict import Comparison, Verdict, compare
 from evaluation.measure.protocol.trials import localize_sequence

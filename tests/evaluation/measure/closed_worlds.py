@@ -9,8 +9,8 @@ from airground.config import Config
 from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
+from airground.core.sighting import Sighting
 from airground.core.surface import AerialSurface
-from airground.pipeline import Sighting
 from evaluation.measure.baselines.interface import Given
 
 T_GROUND_MAV = SE3.from_heading(0.6, (0.35, -0.25, 0.4))

@@ -9,11 +9,10 @@ from pathlib import Path
 
 from airground.config import Config
 from evaluation.measure.protocol.trials import Protocol
-from evaluation.measure.work.experiment import Outcome
-from evaluation.measure.work.measure import Refused, Sent
-from evaluation.measure.work.unit import Unit
+from evaluation.measure.work.measure import Group, Refused
+from evaluation.measure.work.unit import Finished, Unit
 from evaluation.setup.setups import Setup, with_localization
-from evaluation.table.rows import Row
+from evaluation.table.rows import ResultTable, Row
 
 DIE_ONCE, DIE, REFUSE, PAUSE_S = "die_once", "die", "refuse", "pause_s"
 """Files in a unit's folder that say what is to happen in it."""
@@ -41,26 +40,26 @@ def runs(folder: Path) -> list[int]:
     return [(file / RUNS).stat().st_size if (file / RUNS).exists() else 0 for file in files]
 
 
-def work(sent: Sent) -> Outcome | Refused:
+def work(group: Group) -> list[Finished] | Refused:
     """In place of `evaluation.measure.work.measure.work`."""
-    task = sent.task
-    assert isinstance(task.recording, Path)
-    with (task.recording / RUNS).open("ab") as file:
+    first = group.units[0]
+    assert isinstance(first.recording, Path)
+    with (first.recording / RUNS).open("ab") as file:
         file.write(b"x")
-    time.sleep(float((task.recording / PAUSE_S).read_text()))
-    once = task.recording / DIE_ONCE
+    time.sleep(float((first.recording / PAUSE_S).read_text()))
+    once = first.recording / DIE_ONCE
     if once.exists():
         once.unlink()
         os.kill(os.getpid(), signal.SIGKILL)
-    if (task.recording / DIE).exists():
+    if (first.recording / DIE).exists():
         os.kill(os.getpid(), signal.SIGKILL)
-    if (task.recording / REFUSE).exists():
-        return Refused(f"flight {task.seed} is impossible")
-    parts = []
-    for setup in task.setups:
-        value = task.seed + setup.config.localization.particles / 1000
-        condition = setup.condition("none")
+    if (first.recording / REFUSE).exists():
+        return Refused(f"flight {first.seed} is impossible")
+    finished = []
+    for unit in group.units:
+        value = unit.seed + unit.setup.config.localization.particles / 1000
+        condition = unit.setup.condition("none")
         place = {"sequence": 0, "iteration": 1}
-        row = Row("tiny", task.seed, 0, condition, "localization", "error_m", value, "m", **place)
-        parts.append([row])
-    return Outcome(parts, None)
+        row = Row("tiny", unit.seed, 0, condition, "localization", "error_m", value, "m", **place)
+        finished.append(Finished(ResultTable.from_rows([row])))
+    return finished

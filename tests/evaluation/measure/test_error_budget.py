@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
+from airground.core.sighting import Sighting
 from airground.core.surface import AerialSurface
-from airground.pipeline import Sighting
 from evaluation.measure.protocol.error_budget import (
     STAND_INS,
     with_true_ground_map,

@@ -13,7 +13,7 @@ from airground.config import Config
 from airground.core.cloud import PointCloud
 from airground.core.height_map import lattice_index, make_height_map
 from airground.core.se3 import SE3
-from airground.pipeline import Sighting
+from airground.core.sighting import Sighting
 from evaluation.measure.protocol.mapping_pass import GroundPass, Maps
 from evaluation.measure.protocol.negatives import (
     OVERLAP_LEFT,

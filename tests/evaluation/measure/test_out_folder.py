@@ -7,19 +7,18 @@ from pathlib import Path
 import pytest
 
 from airground.errors import InputError
-from evaluation.measure.work.experiment import Outcome
 from evaluation.measure.work.out_folder import LOCK, resumable_folder
-from evaluation.measure.work.unit import UnitStore
+from evaluation.measure.work.unit import Finished, UnitStore
 from evaluation.setup.condition import Condition
-from evaluation.table.rows import Row
+from evaluation.table.rows import ResultTable, Row
 
 ROW = Row("tiny", 0, 0, Condition("best", "slam", "none", "known"), "run", "recorded_s", 1.0, "s")
-FOUND = Outcome([[ROW]], None)
+FOUND = Finished(ResultTable.from_rows([ROW]))
 
 
 def fail_after_a_unit(out: Path) -> None:
     with resumable_folder(out) as folder:
-        folder.store.write("key", {}, FOUND.rows, None)
+        folder.store.write("key", {}, FOUND)
         (folder.results / "summary.json").write_text("first")
         (folder.scratch / "left").write_text("behind")
         raise RuntimeError
@@ -62,7 +61,7 @@ def test_other_folders_are_left_alone(tmp_path: Path) -> None:
 def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
     out = tmp_path / "out"
     with resumable_folder(out) as folder:
-        folder.store.write("key", {}, FOUND.rows, None)
+        folder.store.write("key", {}, FOUND)
         with pytest.raises(InputError, match="another run"), resumable_folder(out):
             pass
         assert folder.scratch.is_dir()
@@ -72,7 +71,7 @@ def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
 
 def test_what_a_killed_run_left_half_written_is_removed(tmp_path: Path) -> None:
     store = UnitStore(tmp_path)
-    store.write("whole", {"a": 1}, FOUND.rows, None)
+    store.write("whole", {"a": 1}, FOUND)
     half = tmp_path / ".partial-x"
     half.mkdir()
     (half / "rows.parquet").write_bytes(b"PAR1")
@@ -84,7 +83,7 @@ def test_what_a_killed_run_left_half_written_is_removed(tmp_path: Path) -> None:
 
 def test_a_damaged_unit_is_named(tmp_path: Path) -> None:
     store = UnitStore(tmp_path)
-    store.write("key", {}, FOUND.rows, None)
+    store.write("key", {}, FOUND)
     (tmp_path / "key/rows.parquet").write_bytes(b"PAR1")
     with pytest.raises(InputError, match=r"key/rows\.parquet: no readable results table"):
         store.read("key")

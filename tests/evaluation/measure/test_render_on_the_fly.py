@@ -7,9 +7,10 @@ import pytest
 
 from airground.config import Config
 from evaluation.measure.protocol.trials import Protocol
-from evaluation.measure.work.experiment import Task, run_task
+from evaluation.measure.work.experiment import measure_units
+from evaluation.measure.work.unit import Finished, Unit
 from evaluation.setup.setups import Setup
-from evaluation.table.rows import CLOCK_STAGES, Row
+from evaluation.table.rows import CLOCK_STAGES
 from sim.recording.recorder import record
 from sim.recording.rendered import Flight
 from sim.scene import parse_scene
@@ -17,9 +18,9 @@ from sim.sensors.presets import NOMINAL
 from tests.sim.small_flight import SCENE
 
 
-def measured(rows: list[Row]) -> list[str]:
-    """All that must agree, in words, for a missing value is not equal to itself."""
-    return [repr(row) for row in rows if row.stage not in CLOCK_STAGES]
+def measured(finished: Finished) -> list[str]:
+    """All that must agree, as text, since a missing value is not equal to itself."""
+    return [repr(row) for row in finished.table.without(CLOCK_STAGES).frame.itertuples()]
 
 
 @pytest.mark.slow
@@ -27,10 +28,10 @@ def test_results_are_those_from_disk(tmp_path: Path) -> None:
     scene = parse_scene(SCENE, "small.toml").model_copy(update={"duration_s": 7.0})
     flight = Flight(scene, 3, 0, NOMINAL)
     path = record(scene, 3, NOMINAL, tmp_path / "recording", workers=1)
-    setups = [Setup(Config(), "oracle")]
-    task = Task(path, 3, 0, setups, Protocol(1, 2), negatives=True, stranger=path)
-    stored = run_task(task)
-    drawn = run_task(replace(task, recording=flight, stranger=flight))
+    setup = Setup(Config(), "oracle")
+    unit = Unit(path, 3, 0, setup, Protocol(1, 2), negatives=True, stranger=path)
+    [stored] = measure_units([unit], renderers=1)
+    [drawn] = measure_units([replace(unit, recording=flight, stranger=flight)], renderers=1)
     for stage in ("surface", "no_overlap", "wrong_map"):
-        assert len([row for row in stored.rows if row.stage == stage]) > 0
-    assert measured(drawn.rows) == measured(stored.rows)
+        assert (stored.table.frame["stage"] == stage).any()
+    assert measured(drawn) == measured(stored)

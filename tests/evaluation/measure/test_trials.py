@@ -30,7 +30,7 @@ def flown() -> Flown:
 @pytest.mark.parametrize("name", CONFIGS)
 def test_side_by_side_is_as_one_by_one(flown: Flown, name: str) -> None:
     config, sightings = CONFIGS[name], flown.sightings
-    filters = [(start, np.random.default_rng(start)) for start in STARTS]
+    filters = {i: (start, np.random.default_rng(start)) for i, start in enumerate(STARTS)}
     together: dict[int, list[Belief]] = defaultdict(list)
     shared: list[int] = []
     steps = localize_sequences(sightings, LENGTH, flown.truth, config, filters)  # type: ignore[arg-type]

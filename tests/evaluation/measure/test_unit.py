@@ -15,7 +15,7 @@ from airground.config import Config, MonocularSlam
 from airground.errors import InputError
 from evaluation.measure.protocol.trials import Protocol
 from evaluation.measure.work import unit as module
-from evaluation.measure.work.unit import Unit, grouped, key_of, task_of
+from evaluation.measure.work.unit import Unit, grouped, key_of
 from evaluation.setup.setups import PoseNoise, Setup, with_localization
 from sim.recording.rendered import Flight
 from sim.scene import load_scene
@@ -137,7 +137,3 @@ def test_what_is_done_for_the_first_setup_alone_is_done_for_the_right_one() -> N
     shown, plain = replace(UNIT, **asked), replace(UNIT, seed=3)  # type: ignore[arg-type]
     assert grouped([shown, plain]) == [[shown, plain]]
     assert grouped([plain, shown]) == [[plain], [shown]]
-    task = task_of([shown, plain], renderers=2)
-    assert (task.showcase, task.baselines, task.budget) == (True, True, False)
-    assert (task.negatives, task.stranger) == (True, FLIGHT)
-    assert (task.setups, task.renderers) == ([shown.setup, plain.setup], 2)

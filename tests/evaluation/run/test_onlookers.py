@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import cast
 
+import numpy as np
 import pytest
 
 from airground.config import Config
@@ -12,14 +14,27 @@ from airground.core.cloud import Source
 from airground.core.events import GroundMapExtended, GroundTracked, Initializing, TrackingLost
 from airground.io.recording import Recording
 from airground.slam.front_end import Tracking
+from airground.tracking import TrackedFrame
+from evaluation.run.driver import drive, pipeline_for
 from evaluation.run.onlooker import Onlooker, Seen
-from evaluation.run.recording import Measure
+from evaluation.run.recording import RunRows
+from evaluation.run.tracking import TrackingReport
 from evaluation.setup.setups import EXACT, Setup
 from tests.evaluation.show.scripted_run import LENS, SECOND, TRUTH, ground_frame, mav_frame
 
+ROBOT = SimpleNamespace(calibration=LENS, camera_stamps=[0])
 RECORDING = cast(
     Recording,
-    SimpleNamespace(mav=LENS, ground=LENS, scene="s", seed=0, flight=0, sensors="none"),
+    SimpleNamespace(
+        of=lambda robot: ROBOT,
+        mav=ROBOT,
+        ground=ROBOT,
+        scene="s",
+        seed=0,
+        flight=0,
+        sensors="none",
+        duration_s=3.0,
+    ),
 )
 FRAMES = [
     ground_frame(SECOND, Tracking.INITIALIZING),
@@ -40,10 +55,25 @@ class Watching:
         self.now_s += 100.0
 
 
-def measured(*onlookers: Onlooker) -> Measure:
-    measure = Measure(RECORDING, TRUTH, Setup(Config(), "slam", EXACT), 0, onlookers)
-    measure.run(FRAMES)
-    return measure
+class Frames:
+    """Tracking that gives the frames above."""
+
+    def wait_until_ready(self) -> None:
+        """Ready at once."""
+
+    def frames(self) -> Iterator[TrackedFrame]:
+        return iter(FRAMES)
+
+    def report(self) -> TrackingReport:
+        return TrackingReport({}, None)
+
+
+def measured(*onlookers: Onlooker) -> RunRows:
+    setup = Setup(Config(), "slam", EXACT)
+    rows = RunRows(RECORDING, TRUTH, setup)
+    pipeline = pipeline_for(RECORDING, setup, np.random.default_rng(0))
+    drive(RECORDING, Frames(), pipeline, setup, [rows, *onlookers])
+    return rows
 
 
 def test_every_event_comes_with_the_frame_that_it_is_of() -> None:

@@ -17,10 +17,10 @@ from airground.core.messages import GroundImage, MavImage
 from airground.errors import AirgroundError
 from airground.io.recording import Recording
 from airground.tracking import TrackedFrame
-from evaluation.run import tracking_process
+from evaluation.run import tracking_apart
 from evaluation.run.drops import Stamps, nothing_dropped
 from evaluation.run.tracking import TrackingHere, TrackingTask
-from evaluation.run.tracking_process import TrackingApart
+from evaluation.run.tracking_apart import TrackingApart
 from evaluation.setup.setups import Setup
 from sim.recording.truth import Truth
 
@@ -50,10 +50,10 @@ def content(frame: TrackedFrame) -> list[object]:
 def test_frames_and_report_are_those_of_tracking_here(
     small: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(tracking_process, "FRAMES_AHEAD", 5)  # slots are used again
+    monkeypatch.setattr(tracking_apart, "FRAMES_AHEAD", 5)  # slots are used again
     dropped = (int(Recording.open(small).mav.camera_stamps[4]),)
     here = TrackingHere(task(small, dropped))
-    wanted = [content(frame) for frame in here.in_turn()]
+    wanted = [content(frame) for frame in here.frames()]
     report = here.report()
     with TrackingApart(task(small, dropped)) as apart:
         apart.wait_until_ready()
@@ -76,7 +76,7 @@ def test_frames_and_report_are_those_of_tracking_here(
 def test_a_process_that_tracks_does_without_what_others_need() -> None:
     """Of each there would be two more: some 100 MiB a process."""
     script = (
-        "import sys; import evaluation.run.tracking_process\n"
+        "import sys; import evaluation.run.tracking_apart\n"
         "print(sorted({'open3d', 'mujoco', 'pandas', 'evo', 'matplotlib'} & set(sys.modules)))"
     )
     done = subprocess.run(
@@ -87,7 +87,7 @@ def test_a_process_that_tracks_does_without_what_others_need() -> None:
 
 def test_frames_can_be_kept(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nobody writes into an image that was handed over, though its slot is used again."""
-    monkeypatch.setattr(tracking_process, "FRAMES_AHEAD", 2)
+    monkeypatch.setattr(tracking_apart, "FRAMES_AHEAD", 2)
     with TrackingApart(task(small)) as apart:
         apart.wait_until_ready()
         frames = []
@@ -112,7 +112,7 @@ def test_what_cannot_be_read_is_told_as_here(small: Path, tmp_path: Path) -> Non
     shutil.copytree(small, broken)
     sorted((broken / "mav0" / "cam0" / "data").iterdir())[9].write_bytes(b"no picture")
     with pytest.raises(AirgroundError) as here:
-        list(TrackingHere(task(broken)).in_turn())
+        list(TrackingHere(task(broken), ahead=0).frames())
     with TrackingApart(task(broken)) as apart:
         apart.wait_until_ready()
         with pytest.raises(AirgroundError) as there:
@@ -127,7 +127,7 @@ def test_a_death_is_told_and_all_end_with_the_block(
     small: Path, robot: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # Neither can be through with its 21 images before it dies: it waits for a free slot.
-    monkeypatch.setattr(tracking_process, "FRAMES_AHEAD", 2)
+    monkeypatch.setattr(tracking_apart, "FRAMES_AHEAD", 2)
     with TrackingApart(task(small)) as apart:
         apart.wait_until_ready()
         pids = apart.pids

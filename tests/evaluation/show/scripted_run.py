@@ -32,8 +32,8 @@ from airground.core.events import (
 )
 from airground.core.messages import GroundImage, MavImage, RobotCalibration
 from airground.core.se3 import SE3
+from airground.core.sighting import Sighting
 from airground.core.surface import AerialSurface, DepthMap
-from airground.pipeline import Sighting
 from airground.slam.front_end import TrackedCorners, TrackedPose, Tracking
 from airground.tracking import TrackedFrame
 from evaluation.run.onlooker import Onlooker, Seen
