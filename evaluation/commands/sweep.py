@@ -48,7 +48,7 @@ class Sweep(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, ClusterWor
     """Cut flights short."""
 
     def main(self) -> None:
-        from evaluation.judge.readings import sweep
+        from evaluation.judge.sweep import sweep
         from evaluation.measure.work.crew import Crew
         from evaluation.measure.work.out_folder import resumable_folder
         from evaluation.show.sweep_results import print_sweep, write_sweep

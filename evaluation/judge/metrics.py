@@ -1,7 +1,9 @@
-"""The watched metrics: a literal table. Times are never judged: they depend on the machine.
+"""The table of metrics: what is measured, in which direction it is better, and what matters.
 
-What matters is declared before anything is measured, as a share of the accepted figure for
-errors, and in percentage points for shares. A smaller effect is no difference, however sure.
+Summary, report, verdicts, sweeps and the documentation read it. Times are never judged, since
+they depend on the machine. What matters is declared before anything is measured, as a share of
+the accepted figure for errors and in percentage points for shares; a smaller effect makes no
+verdict, however certain it is.
 """
 
 from __future__ import annotations
@@ -13,6 +15,18 @@ from typing import Literal
 from evaluation.judge import samples
 from evaluation.judge.samples import Samples, Take
 from evaluation.measure.protocol import wide_search
+from evaluation.setup import published
+from evaluation.setup.published import Published
+from evaluation.setup.text import MISSING, degrees, formatted, metres, percent
+from evaluation.table.limits import (
+    FIRST_MAP,
+    FOURTH_MAP,
+    GOOD_POSE,
+    LOCATED_M,
+    NEAR_M,
+    REFINED_DEG,
+    REFINED_M,
+)
 from evaluation.table.rows import ResultTable
 
 UnitOfObservation = Literal["recording", "surface", "sequence", "aerial map", "trial"]
@@ -20,21 +34,23 @@ UnitOfObservation = Literal["recording", "surface", "sequence", "aerial map", "t
 
 @dataclass(frozen=True)
 class Metric:
-    """One watched metric.
+    """One metric.
 
     Attributes:
         name: Its key in files.
-        title: What a reader sees.
-        unit: "m", "deg", "count", "cost" (a height map's), or "" for a share.
-        better: Which direction is.
+        title: Its name for readers.
+        unit: "m", "deg", "count", "cost" (of height maps), or "" for a share.
+        better: Which direction is better.
         each: What one value belongs to.
         take: Finds the values in a table of results.
         failure: What a missing or failed value counts as.
-        share: Whether values are 0 or 1, told as a share.
-        matters: The smallest effect that does; of the accepted figure where `relative`.
-        relative: See `matters`.
-        why: Why that much matters and no less.
+        why: Reason of `matters`.
+        matters: The smallest effect that matters; 0 for a metric that is shown, not judged.
+        relative: Whether `matters` is a share of the accepted figure, else it has the unit.
+        share: Whether values are 0 or 1, summarized by their mean.
         controls: Whether it is of scenes in which there is nothing to find.
+        iteration: Aerial map after which a sequence is judged; None for other metrics.
+        published: The paper's value.
     """
 
     name: str
@@ -44,194 +60,201 @@ class Metric:
     each: UnitOfObservation
     take: Take
     failure: float
-    matters: float
-    why: str
-    share: bool = False
+    why: str = ""
+    matters: float = 0.0
     relative: bool = False
+    share: bool = False
     controls: bool = False
+    iteration: int | None = None
+    published: Published | None = None
 
     def samples(self, table: ResultTable) -> Samples:
         """Its values in a table of one condition, by flight."""
         part = table.controls() if self.controls else table.without_controls()
         return samples.by_flight(part, self.take(part), self.failure)
 
+    def text(self, value: float) -> str:
+        """A value for readers."""
+        match self.unit:
+            case "m":
+                return metres(value)
+            case "deg":
+                return degrees(value)
+            case _:
+                return self.fine_text(value)
 
-def _error(name: str, title: str, each: UnitOfObservation, take: Take, unit: str = "m") -> Metric:
-    """An error in metres or degrees: failures are infinitely large."""
-    slam = each == "recording"
+    def fine_text(self, value: float, sign: str = "") -> str:
+        """A value to compare with another, with one more digit; `sign` "+" for a change."""
+        match self.unit:
+            case "m":
+                return metres(value, 2, sign)
+            case "deg":
+                return degrees(value, 3, sign)
+            case "count":
+                return formatted(value, f"{{:{sign}.1f}}")
+            case "cost":
+                return formatted(value, f"{{:{sign}.3f}}")
+            case _:
+                return percent(value, 1, sign)
+
+    @property
+    def paper(self) -> str:
+        """The paper's value for readers."""
+        if self.published is None:
+            return MISSING
+        value = self.published.value
+        forms = {"m": f"{1e3 * value:g} mm", "deg": f"{value:.1f}°", "": f"{100 * value:g} %"}
+        return forms[self.unit]
+
+
+_TENTH = "a tenth: the error of one path varies by less"
+_TWENTIETH = "a twentieth: smaller changes do not matter in practice"
+_TWO = "two in a hundred: the goals are stated to that precision"
+_ONE = "one in a hundred: the goal is to stay below it"
+
+
+def _error(
+    name: str,
+    title: str,
+    each: UnitOfObservation,
+    take: Take,
+    unit: str = "m",
+    iteration: int | None = None,
+    published: Published | None = None,
+) -> Metric:
+    """An error in metres or degrees: a failure is infinitely large."""
+    why, matters = (_TENTH, 0.10) if each == "recording" else (_TWENTIETH, 0.05)
     return Metric(
-        name,
-        title,
-        unit,
-        "lower",
-        each,
-        take,
-        failure=math.inf,
-        matters=0.10 if slam else 0.05,
-        why="a tenth: one path's error says no more" if slam else "a twentieth: less helps nobody",
-        relative=True,
-    )
+        name, title, unit, "lower", each, take, math.inf, why, matters, relative=True,
+        iteration=iteration, published=published,
+    )  # fmt: skip
 
 
-def _success(name: str, title: str, each: UnitOfObservation, take: Take) -> Metric:
+def _success(
+    name: str,
+    title: str,
+    each: UnitOfObservation,
+    take: Take,
+    iteration: int | None = None,
+    published: Published | None = None,
+) -> Metric:
     """How often something succeeds: what is missing did not."""
-    why = "two in a hundred: the goals are told in so many"
-    return Metric(name, title, "", "higher", each, take, 0.0, 0.02, why, share=True)
+    return Metric(
+        name, title, "", "higher", each, take, 0.0, _TWO, 0.02, share=True,
+        iteration=iteration, published=published,
+    )  # fmt: skip
 
 
 def _wrong(
     name: str, title: str, each: UnitOfObservation, take: Take, controls: bool = False
 ) -> Metric:
     """How often something false is claimed: what is missing claims nothing."""
-    why = "one in a hundred: the goal is to stay below it"
     return Metric(
-        name, title, "", "lower", each, take, 0.0, 0.01, why, share=True, controls=controls
+        name, title, "", "lower", each, take, 0.0, _ONE, 0.01, share=True, controls=controls
     )
+
+
+def _tracked(robot: str, title: str) -> Metric:
+    """The share of tracked images; `evaluation.table.tracked_share` defines it."""
+    take = samples.values("trajectory", f"{robot}_tracked_fraction")
+    why = "two in a hundred: half a second of a recording of the suite"
+    return Metric(f"{robot}_tracked", title, "", "higher", "recording", take, 0.0, why, 0.02)
 
 
 WATCHED = (
     _error(
-        "mav_trajectory",
-        "MAV's SLAM, live",
-        "recording",
-        samples.values("trajectory", "mav_ate_se3_rmse_m"),
+        "mav_trajectory", "MAV: live, RMS error", "recording",
+        samples.values("trajectory", "mav_ate_se3_rmse_m"), published=published.MAV_RMSE_M,
     ),
     _error(
-        "ground_trajectory",
-        "ground robot's SLAM, live",
-        "recording",
-        samples.values("trajectory", "ground_ate_se3_rmse_m"),
+        "ground_trajectory", "ground: live, RMS error", "recording",
+        samples.values("trajectory", "ground_ate_se3_rmse_m"), published=published.GROUND_RMSE_M,
     ),
+    _tracked("mav", "MAV: tracked"),
+    _tracked("ground", "ground: tracked"),
     Metric(
-        "mav_tracked",
-        "MAV tracked",
-        "",
-        "higher",
-        "recording",
-        samples.values("trajectory", "mav_tracked_fraction"),
-        failure=0.0,
-        matters=0.02,
-        why="two in a hundred: half a second of these flights",
-    ),
-    Metric(
-        "ground_tracked",
-        "ground robot tracked",
-        "",
-        "higher",
-        "recording",
-        samples.values("trajectory", "ground_tracked_fraction"),
-        failure=0.0,
-        matters=0.02,
-        why="two in a hundred: half a second of these drives",
-    ),
-    Metric(
-        "aerial_maps",
-        "aerial maps a flight",
-        "count",
-        "higher",
-        "recording",
-        samples.surfaces_a_flight,
-        failure=0.0,
-        matters=0.05,
-        why="a twentieth: less than one map a flight",
+        "aerial_maps", "aerial maps per flight", "count", "higher", "recording",
+        samples.surfaces_a_flight, 0.0, "a twentieth: less than one map per flight", 0.05,
         relative=True,
     ),
     _error(
-        "surface_median",
-        "surface, median error",
-        "surface",
+        "surface_median", "surface, median error", "surface",
         samples.values("surface", "error_median_m"),
     ),
     _error(
-        "surface_p90",
-        "surface, 90 % error",
-        "surface",
-        samples.values("surface", "error_p90_m"),
+        "surface_p90", "surface, 90 % error", "surface", samples.values("surface", "error_p90_m")
     ),
     Metric(
-        "completeness",
-        "surface, completeness",
-        "",
-        "higher",
-        "surface",
-        samples.values("surface", "completeness"),
-        failure=0.0,
-        matters=0.02,
-        why="two in a hundred pixels: what one depth map more or less gives",
+        "completeness", "surface, completeness", "", "higher", "surface",
+        samples.values("surface", "completeness"), 0.0,
+        "two in a hundred pixels: the effect of one depth map more or less", 0.02,
     ),
     _error(
-        "localization_1",
-        "localization error, map 1",
-        "sequence",
-        samples.localization("error_m", 1),
+        "localization_1", "localization error, map 1", "sequence",
+        samples.localization("error_m", FIRST_MAP), iteration=FIRST_MAP,
     ),
     _error(
-        "localization_4",
-        "localization error, map 4",
-        "sequence",
-        samples.localization("error_m", 4),
+        "localization_4", "localization error, map 4", "sequence",
+        samples.localization("error_m", FOURTH_MAP), iteration=FOURTH_MAP,
     ),
     # How much the first map leaves open (Fig. 12).
     _error(
-        "spread_1",
-        "particles' spread, map 1",
-        "sequence",
-        samples.localization("spread_m", 1),
+        "spread_1", "particles' spread, map 1", "sequence",
+        samples.localization("spread_m", FIRST_MAP), iteration=FIRST_MAP,
     ),
     # How clearly the true place wins where most places hold little of the map.
     Metric(
-        "wide_lead",
-        "true place's lead, wide",
-        "cost",
-        "higher",
-        "surface",
-        samples.values(wide_search.STAGE, "lead"),
-        failure=-wide_search.WORST,
-        matters=0.05,
-        why="a twentieth: less helps nobody",
+        "wide_lead", "true place's lead, wide", "cost", "higher", "surface",
+        samples.values(wide_search.STAGE, "lead"), -wide_search.WORST, _TWENTIETH, 0.05,
         relative=True,
     ),
     _success(
-        "wide_within_50cm",
-        "within 0.5 m, wide search",
-        "surface",
-        samples.widely_located(0.50),
+        "wide_within_50cm", f"within {NEAR_M:g} m, wide search", "surface",
+        samples.widely_located(NEAR_M),
     ),
-    _success("within_50cm_1", "within 0.5 m, map 1", "sequence", samples.located(1, 0.50)),
-    _success("within_25cm_4", "within 0.25 m, map 4", "sequence", samples.located(4, 0.25)),
-    _success("located", "localizations accepted", "aerial map", samples.claimed),
+    _success(
+        "within_50cm_1", f"within {NEAR_M:g} m after 1 map", "sequence",
+        samples.located(FIRST_MAP, NEAR_M), FIRST_MAP, published.WITHIN_0_50_M_FIRST,
+    ),
+    _success(
+        "within_25cm_4", f"within {LOCATED_M:g} m after 4 maps", "sequence",
+        samples.located(FOURTH_MAP, LOCATED_M), FOURTH_MAP, published.WITHIN_0_25_M_FOURTH,
+    ),
+    _success("located", "positions claimed", "aerial map", samples.claimed),
     _wrong(
-        "located_wrongly",
-        "accepted, beyond 0.25 m",
-        "aerial map",
+        "located_wrongly", f"claimed, beyond {LOCATED_M:g} m", "aerial map",
         samples.claimed_wrongly,
     ),
     _error(
-        "refined_translation",
-        "refined position",
-        "trial",
-        samples.refined("after_translation_m"),
+        "refined_translation", "refined position", "trial", samples.refined("after_translation_m"),
+        published=published.REFINEMENT_TRANSLATION_M,
     ),
     _error(
-        "refined_rotation",
-        "refined angle",
-        "trial",
-        samples.refined("after_rotation_deg"),
-        unit="deg",
+        "refined_rotation", "refined angle", "trial", samples.refined("after_rotation_deg"),
+        unit="deg", published=published.REFINEMENT_ROTATION_DEG,
     ),
-    _success("refined_well", "refined within 5 cm, 2°", "trial", samples.refined_well),
+    _success("refined_well", f"within {GOOD_POSE}", "trial", samples.refined_well),
     _success("refinement_accepted", "refinements accepted", "trial", samples.refined("accepted")),
     _wrong(
-        "refined_wrongly",
-        "accepted, beyond 5 cm, 2°",
-        "trial",
+        "refined_wrongly", f"accepted, beyond {100 * REFINED_M:g} cm, {REFINED_DEG:g}°", "trial",
         samples.refined_wrongly,
     ),
     _wrong(
-        "control_claims",
-        "claims in control scenes",
-        "aerial map",
-        samples.claimed,
-        controls=True,
+        "control_claims", "claims in control scenes", "aerial map", samples.claimed, controls=True
     ),
-)
+)  # fmt: skip
+"""Metrics that verdicts judge, in the order in which files and tables have them."""
+
+HEADING_DEG = 3.0
+"""Limit of the heading's error beside that of the position: the paper's median [deg]."""
+POSED_4 = Metric(
+    "posed_4", f"within {LOCATED_M:g} m and {HEADING_DEG:g}° after 4 maps", "", "higher",
+    "sequence", samples.located(FOURTH_MAP, LOCATED_M, HEADING_DEG), 0.0, share=True,
+    iteration=FOURTH_MAP,
+)  # fmt: skip
+LOCALIZATION_12 = Metric(
+    "localization_12", "localization error, map 12", "m", "lower", "sequence",
+    samples.localization("error_m", 12), math.inf, iteration=12,
+)  # fmt: skip
+METRICS = {metric.name: metric for metric in (*WATCHED, POSED_4, LOCALIZATION_12)}
+"""Every metric by its name: those that verdicts judge, and those that reports show only."""

@@ -1,20 +1,28 @@
-"""What a sweep reads off at each point: shares and medians, with their intervals."""
+"""What a table says of a metric: a share or a median, with its 95 % interval.
+
+Every number of the summary, the report and the sweeps is read here. Values are pooled over all
+flights; verdicts, which take flights as observations, are `evaluation.judge.verdict`'s.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from evaluation.judge.summary import within_5cm_2deg
-from evaluation.measure.plans.dials import Point
-from evaluation.measure.plans.sweep import SweepPlan
-from evaluation.measure.work.crew import Crew
-from evaluation.measure.work.measure import measure
-from evaluation.measure.work.unit import UnitStore
-from evaluation.table.intervals import Rate, median_interval, rate_within, wilson
-from evaluation.table.rows import CLOCK_STAGES, ResultTable
+from evaluation.judge.metrics import Metric
+from evaluation.judge.samples import Take
+from evaluation.table.intervals import (
+    Quantiles,
+    Rate,
+    median_interval,
+    quantile,
+    quantiles,
+    wilson,
+    with_failures,
+)
+from evaluation.table.rows import ResultTable
 
 BOOTSTRAP_SEED = 0
 """The same table always gets the same intervals."""
@@ -22,7 +30,7 @@ BOOTSTRAP_SEED = 0
 
 @dataclass(frozen=True)
 class Reading:
-    """A value with its 95 % interval, and how many sequences or trials it is made of."""
+    """A share or a median with its 95 % interval, and the number of values it is made of."""
 
     value: float
     low: float
@@ -30,105 +38,49 @@ class Reading:
     count: int
 
 
-@dataclass(frozen=True)
-class Quantity:
-    """One curve of a sweep.
-
-    Attributes:
-        name: In files.
-        title: For people.
-        short: The same for the head of a narrow column.
-        unit: "%" for a share of 1, or that of the value.
-        counted: What is counted: "sequences" or "trials".
-        read: The reading of one point's rows.
-    """
-
-    name: str
-    title: str
-    short: str
-    unit: str
-    counted: str
-    read: Callable[[ResultTable], Reading]
+def rate_of(take: Take, table: ResultTable) -> Rate:
+    """How many of the values, 0 or 1 each, are 1."""
+    taken = take(table)
+    return wilson(int((taken > 0).sum()), len(taken))
 
 
-def success_at(table: ResultTable, iteration: int, limit: float) -> Rate:
-    """How many sequences are within `limit` at an iteration; none where it was not reached."""
-    errors = table.sequences("error_m")
-    if len(errors) == 0 or iteration not in errors:
-        return wilson(0, 0)
-    return rate_within(errors[iteration], limit)
+def rate(metric: Metric, table: ResultTable) -> Rate:
+    """The share of a metric's values that are 1; of none where no sequence got that far."""
+    return rate_of(metric.take, table) if _is_reached(metric, table) else wilson(0, 0)
 
 
-def _of_rate(rate: Rate) -> Reading:
-    return Reading(rate.share, rate.low, rate.high, rate.total)
+def values(metric: Metric, table: ResultTable) -> NDArray[np.float64]:
+    """(N,) a metric's values, failures as +inf; none where no sequence got that far."""
+    return with_failures(metric.take(table) if _is_reached(metric, table) else [])
 
 
-def _median(metric: str) -> Callable[[ResultTable], Reading]:
-    def read(table: ResultTable) -> Reading:
-        values = table.values("refinement", metric)
-        interval = median_interval(values, np.random.default_rng(BOOTSTRAP_SEED))
-        return Reading(interval.value, interval.low, interval.high, len(values))
-
-    return read
+def median(metric: Metric, table: ResultTable) -> float:
+    """The median of a metric's values; NaN of none."""
+    return quantile(values(metric, table), 0.5)
 
 
-QUANTITIES = (
-    Quantity(
-        "within_0_50_m_first", "within 0.5 m after 1 aerial map", "0.5 m, 1 map", "%", "sequences",
-        lambda table: _of_rate(success_at(table, 1, 0.50)),
-    ),
-    Quantity(
-        "within_0_25_m_fourth", "within 0.25 m after 4 aerial maps", "0.25 m, 4 maps",
-        "%", "sequences",
-        lambda table: _of_rate(success_at(table, 4, 0.25)),
-    ),
-    Quantity(
-        "within_5cm_2deg", "refined within 5 cm and 2°", "5 cm and 2°", "%", "trials",
-        lambda table: _of_rate(wilson(*within_5cm_2deg(table))),
-    ),
-    Quantity(
-        "refined_translation_m", "refined, median position", "refined", "m", "trials",
-        _median("after_translation_m"),
-    ),
-    Quantity(
-        "refined_rotation_deg", "refined, median angle", "refined", "deg", "trials",
-        _median("after_rotation_deg"),
-    ),
-)  # fmt: skip
-"""The paper's two success rates (Fig. 11), ours, and the medians of Fig. 13 and 14."""
+def read(metric: Metric, table: ResultTable) -> Reading:
+    """A metric's share or median with its interval."""
+    if metric.share:
+        found = rate(metric, table)
+        return Reading(found.share, found.low, found.high, found.total)
+    taken = values(metric, table)
+    interval = median_interval(taken, np.random.default_rng(BOOTSTRAP_SEED))
+    return Reading(interval.value, interval.low, interval.high, len(taken))
 
 
-def readings(table: ResultTable) -> dict[str, Reading]:
-    """All quantities of one point, by name."""
-    return {quantity.name: quantity.read(table) for quantity in QUANTITIES}
+def spread(take: Take, table: ResultTable) -> Quantiles:
+    """The quantiles of what is taken; infinite where failures reach, NaN of no values."""
+    return quantiles(take(table))
 
 
-@dataclass(frozen=True)
-class Measured:
-    """One point of a sweep.
-
-    Attributes:
-        point: Where the dials stand.
-        table: All rows measured there that do not depend on the machine.
-        readings: What they come to.
-    """
-
-    point: Point
-    table: ResultTable
-    readings: dict[str, Reading]
+def _is_reached(metric: Metric, table: ResultTable) -> bool:
+    """Whether some sequence has the aerial map after which the metric is judged."""
+    return metric.iteration is None or metric.iteration in table.sequences("error_m")
 
 
-def sweep(plan: SweepPlan, store: UnitStore, crew: Crew) -> list[Measured]:
-    """Measure every point that is not measured yet, and read off the quantities.
-
-    Raises:
-        InputError: A point cannot be measured.
-    """
-    points = plan.points()
-    units = [plan.units(point) for point in points]
-    found = iter(measure([unit for at_point in units for unit in at_point], store, crew))
-    measured = []
-    for point, at_point in zip(points, units, strict=True):
-        table = ResultTable.concat([next(found).table for _ in at_point]).without(CLOCK_STAGES)
-        measured.append(Measured(point, table, readings(table.without_controls())))
-    return measured
+def real_time_factor(table: ResultTable) -> float:
+    """Recorded seconds over processing seconds of all recordings; NaN where not measured."""
+    processing = float(table.values("run", "processing_s").sum())
+    recorded = float(table.values("run", "recorded_s").sum())
+    return recorded / processing if processing > 0 else float("nan")

@@ -1,4 +1,4 @@
-"""The values of one metric, by flight, in an order that another run repeats."""
+"""Finds the values of a metric in a table of results, ordered as another run repeats them."""
 
 from __future__ import annotations
 
@@ -9,17 +9,15 @@ import numpy as np
 import pandas as pd
 
 from evaluation.measure.protocol import wide_search
+from evaluation.table.limits import LOCATED_M, is_good_pose
 from evaluation.table.rows import SEQUENCE_KEYS, TRIAL_KEYS, ResultTable
 
-LOCATED_M = 0.25
-"""Beyond this a claimed position is wrong."""
-REFINED_M, REFINED_DEG = 0.05, 2.0
 DIGITS = 5
 """Significant digits kept: far finer than any effect that matters, and short in a file."""
 
 
 class Flight(NamedTuple):
-    """One flight over one heap: flights are independent, what happens in one is not."""
+    """One flight over one scene: flights are independent, what happens in one is not."""
 
     scene: str
     seed: int
@@ -30,16 +28,16 @@ class Flight(NamedTuple):
 
 
 Samples = dict[Flight, list[float]]
-"""Values in order of their sequence, iteration or trial; a missing last one just ends."""
+"""Values in order of their sequence, iteration or trial; a missing last one is left out."""
 
 Take = Callable[[ResultTable], pd.Series]
-"""Values whose index begins with scene, seed and flight, and tells the order after that."""
+"""Values with an index of scene, seed, flight and what orders the values of one flight."""
 
 _FLIGHT = SEQUENCE_KEYS[:3]
 
 
 def flights(table: ResultTable) -> list[Flight]:
-    """Every flight of which the table says anything, sorted."""
+    """Every flight of which the table has a row, sorted."""
     unique = table.frame[_FLIGHT].drop_duplicates().itertuples(index=False)
     return sorted(Flight(str(scene), int(seed), int(flight)) for scene, seed, flight in unique)
 
@@ -65,15 +63,21 @@ def values(stage: str, metric: str) -> Take:
     return take
 
 
+def magnitudes(stage: str, metric: str) -> Take:
+    """The absolute values of one metric."""
+    signed = values(stage, metric)
+    return lambda table: signed(table).abs()
+
+
 def surfaces_a_flight(table: ResultTable) -> pd.Series:
-    """How many aerial surfaces each flight gave, 0 included."""
+    """Number of aerial surfaces of each flight, 0 included."""
     counted = table.rows("surface", "completeness").groupby(_FLIGHT)["value"].count()
     everyone = pd.MultiIndex.from_frame(table.frame[_FLIGHT].drop_duplicates())
     return counted.reindex(everyone, fill_value=0)
 
 
 def localization(metric: str, iteration: int) -> Take:
-    """A metric after so many aerial maps; NaN where a sequence ended before."""
+    """A metric after a number of aerial maps; NaN where a sequence ended before."""
 
     def take(table: ResultTable) -> pd.Series:
         wide = table.sequences(metric)
@@ -84,10 +88,22 @@ def localization(metric: str, iteration: int) -> Take:
     return take
 
 
-def located(iteration: int, limit_m: float) -> Take:
-    """1 where the error is within the limit, else 0."""
-    error = localization("error_m", iteration)
-    return lambda table: (error(table) <= limit_m).astype(float)
+def located(iteration: int, limit_m: float, limit_deg: float = np.inf) -> Take:
+    """1 where the errors of position and heading are within their limits, else 0.
+
+    Without measured headings, a limited heading has no values.
+    """
+    off_m, off_deg = localization("error_m", iteration), localization("error_deg", iteration)
+
+    def take(table: ResultTable) -> pd.Series:
+        near = off_m(table) <= limit_m
+        if np.isinf(limit_deg):
+            return near.astype(float)
+        if len(table.values("localization", "error_deg")) == 0:
+            return _nothing(SEQUENCE_KEYS)
+        return (near & (off_deg(table) <= limit_deg)).astype(float)
+
+    return take
 
 
 def widely_located(limit_m: float) -> Take:
@@ -102,7 +118,7 @@ def claimed(table: ResultTable) -> pd.Series:
 
 
 def claimed_wrongly(table: ResultTable) -> pd.Series:
-    """1 where a position was claimed that is wrong, else 0."""
+    """1 where a position was claimed that is off by more than `LOCATED_M`, else 0."""
     right = _beliefs(table, "error_m") <= LOCATED_M
     return ((claimed(table) > 0) & ~right).astype(float)
 
@@ -118,18 +134,24 @@ def refined(metric: str) -> Take:
 
 
 def refined_well(table: ResultTable) -> pd.Series:
-    """1 where a refinement was accepted and right, else 0."""
-    return ((refined("accepted")(table) > 0) & _right(table)).astype(float)
+    """1 where a refinement was accepted and is good, else 0."""
+    return (_accepted(table) & _is_good(table)).astype(float)
 
 
 def refined_wrongly(table: ResultTable) -> pd.Series:
-    """1 where a refinement was accepted and wrong, else 0."""
-    return ((refined("accepted")(table) > 0) & ~_right(table)).astype(float)
+    """1 where a refinement was accepted and is not good, else 0."""
+    return (_accepted(table) & ~_is_good(table)).astype(float)
 
 
-def _right(table: ResultTable) -> pd.Series:
-    position = refined("after_translation_m")(table) <= REFINED_M
-    return position & (refined("after_rotation_deg")(table) <= REFINED_DEG)
+def _accepted(table: ResultTable) -> pd.Series:
+    """Whether each trial was accepted; a table that does not state it counts all as accepted."""
+    trials = table.trials()
+    return trials.get("accepted", pd.Series(1.0, trials.index)) > 0
+
+
+def _is_good(table: ResultTable) -> pd.Series:
+    off_m, off_deg = (refined(f"after_{what}")(table) for what in ("translation_m", "rotation_deg"))
+    return pd.Series(is_good_pose(off_m, off_deg), off_m.index)
 
 
 def _beliefs(table: ResultTable, metric: str) -> pd.Series:

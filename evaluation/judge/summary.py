@@ -12,8 +12,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Literal, Self
 
-import numpy as np
-from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 
 from airground.errors import InputError
@@ -24,11 +22,16 @@ from evaluation.judge.claims import (
     claims_summary,
 )
 from evaluation.judge.live_summary import LiveSummary, live_summary
+from evaluation.judge.metrics import METRICS
+from evaluation.judge.poses import Slam, SlamRobot
+from evaluation.judge.readings import median, rate, rate_of, real_time_factor, spread
+from evaluation.judge.samples import localization, located, refined
 from evaluation.setup.checked_json import Count, Number, Part, Share, number, read_checked
 from evaluation.setup.condition import Condition
 from evaluation.setup.published import TABLE_I
 from evaluation.setup.run_info import RunInfo
-from evaluation.table.intervals import quantile, quantiles, rate_within, wilson, with_failures
+from evaluation.table.intervals import Quantiles, quantiles
+from evaluation.table.limits import LOCATED_M, NEAR_M
 from evaluation.table.rows import ResultTable
 
 SCHEMA: Literal[1] = 1
@@ -37,37 +40,6 @@ SCHEMA: Literal[1] = 1
 class Machine(Part):
     cpu: str
     cores: Count
-
-
-class SlamRobot(Part):
-    """Medians over the runs; `ate` is of live poses, `final_ate` of those believed at the end.
-
-    Scale errors are absolute. `worst` is the largest over the runs, null where one run has no
-    trajectory; `nees` is divided by its degrees of freedom, so that 1 is right.
-    """
-
-    ate_sim3_rmse_m: Number = None
-    ate_se3_rmse_m: Number = None
-    scale_error: Number = None
-    final_ate_sim3_rmse_m: Number = None
-    final_ate_se3_rmse_m: Number = None
-    final_scale_error: Number = None
-    worst_ate_se3_rmse_m: Number = None
-    worst_final_ate_se3_rmse_m: Number = None
-    tracked_fraction: Number = None
-    least_tracked_fraction: Number = None
-    initialized_s: Number = None
-    path_m: Number = None
-    scale_sigma: Number = None
-    nees_position: Number = None
-    within_95_position: Number = None
-    nees_pose: Number = None
-    within_95_pose: Number = None
-
-
-class Slam(Part):
-    mav: SlamRobot
-    ground: SlamRobot
 
 
 class Surface(Part):
@@ -125,6 +97,8 @@ class Refinement(Part):
 
 
 class Timing(Part):
+    """Times [ms]."""
+
     mean: Number
     median: Number
     p95: Number
@@ -144,7 +118,7 @@ class TimingTable(Part):
 
 
 class Summary(Part):
-    """Everything `summary.json` holds (DESIGN.md, "What a run leaves")."""
+    """Everything that `summary.json` holds; docs/formats.md describes the keys."""
 
     schema_: Literal[1] = Field(alias="schema")
     version: str
@@ -201,114 +175,78 @@ def build_summary(table: ResultTable, condition: Condition, run: RunInfo) -> Sum
         surface=_surface(measured),
         localization=_localization(measured),
         refinement=_refinement(measured),
-        timing_ms=_timing(measured),
-        real_time_factor=real_time_factor(measured),
+        timing_ms=TimingTable(
+            **{s.metric: stage_timing(measured, s.metric) for s in TABLE_I if s.in_summary}
+        ),
+        real_time_factor=number(real_time_factor(measured)),
         realtime=live_summary(measured),
         claims=claims_summary(of_condition),
         calibration=calibration_summary(measured),
     )
 
 
-def within_5cm_2deg(table: ResultTable) -> tuple[int, int]:
-    """Successes and number of refinement trials; a refused alignment is no success."""
-    trials = table.trials()
-    if len(trials) == 0:
-        return 0, 0
-    good = (trials["after_translation_m"] <= 0.05) & (trials["after_rotation_deg"] <= 2.0)
-    if "accepted" in trials:
-        good &= trials["accepted"] > 0
-    return int(good.sum()), len(trials)
-
-
-def real_time_factor(table: ResultTable) -> float | None:
-    """Recorded seconds over processing seconds of all recordings; None where not measured."""
-    processing = float(table.values("run", "processing_s").sum())
-    return float(table.values("run", "recorded_s").sum()) / processing if processing > 0 else None
-
-
 def _slam(table: ResultTable, condition: Condition) -> Slam:
     if condition.poses != "slam":
         return Slam(mav=SlamRobot(), ground=SlamRobot())
-    return Slam(mav=_slam_robot(table, "mav"), ground=_slam_robot(table, "ground"))
-
-
-def _slam_robot(table: ResultTable, robot: str) -> SlamRobot:
-    made: dict[str, float | None] = {}
-    for name in SlamRobot.model_fields:
-        metric = name.removeprefix("worst_").removeprefix("least_")
-        values = table.values("trajectory", f"{robot}_{metric}")
-        if name.endswith("scale_error"):
-            values = np.abs(values)
-        if name.startswith("worst_"):
-            made[name] = number(quantile(values, 1.0))
-        elif name.startswith("least_"):
-            made[name] = number(quantile(values, 0.0))
-        else:
-            made[name] = _median(values)
-    return SlamRobot(**made)
+    return Slam(mav=SlamRobot.of(table, "mav"), ground=SlamRobot.of(table, "ground"))
 
 
 def _surface(table: ResultTable) -> Surface:
-    names = Surface.model_fields
-    return Surface(**{name: _median(table.values("surface", name)) for name in names})
+    names = {
+        "error_median_m": "surface_median",
+        "error_p90_m": "surface_p90",
+        "completeness": "completeness",
+    }
+    return Surface(**{key: number(median(METRICS[name], table)) for key, name in names.items()})
 
 
 def _localization(table: ResultTable) -> Localization:
-    errors, spreads = table.sequences("error_m"), table.sequences("spread_m")
+    errors = table.sequences("error_m")
     # Without any sequence there are no iterations either.
-    iterations = list(errors.columns) if len(errors) else []
+    iterations = [int(n) for n in errors.columns] if len(errors) else []
     return Localization(
         sequences=len(errors),
         iterations=len(iterations),
-        error_m=_lists([errors[i] for i in iterations]),
-        spread_m=_lists([spreads[i] for i in iterations]),
-        within_0_50_m=[rate_within(errors[i], 0.50).share for i in iterations],
-        within_0_25_m=[rate_within(errors[i], 0.25).share for i in iterations],
+        error_m=_lists([spread(localization("error_m", i), table) for i in iterations]),
+        spread_m=_lists([spread(localization("spread_m", i), table) for i in iterations]),
+        within_0_50_m=[rate_of(located(i, NEAR_M), table).share for i in iterations],
+        within_0_25_m=[rate_of(located(i, LOCATED_M), table).share for i in iterations],
     )
 
 
 def _refinement(table: ResultTable) -> Refinement:
-    trials = table.trials()
-    successes, total = within_5cm_2deg(table)
-
     def errors(when: str) -> PoseErrors:
-        def column(name: str) -> QuantileValues:
-            return _values(trials.get(f"{when}_{name}", []))
-
-        return PoseErrors(
-            translation_m=column("translation_m"), rotation_deg=column("rotation_deg")
+        of_position, of_angle = (
+            _values(spread(refined(f"{when}_{what}"), table))
+            for what in ("translation_m", "rotation_deg")
         )
+        return PoseErrors(translation_m=of_position, rotation_deg=of_angle)
 
-    share = wilson(successes, total).share if total else None
+    good = rate(METRICS["refined_well"], table)
     return Refinement(
-        trials=total, before=errors("before"), after=errors("after"), within_5cm_2deg=share
+        trials=good.total,
+        before=errors("before"),
+        after=errors("after"),
+        within_5cm_2deg=good.share if good.total else None,
     )
 
 
-def _timing(table: ResultTable) -> TimingTable:
-    entries = {}
-    for stage in TABLE_I:
-        if stage.in_summary:
-            values = table.values("timing", stage.metric)
-            spread = quantiles(values)
-            entries[stage.metric] = Timing(
-                mean=float(values.mean()) if len(values) else None,
-                median=number(spread.median),
-                p95=number(spread.p95),
-                n=len(values),
-            )
-    return TimingTable(**entries)
+def stage_timing(table: ResultTable, stage: str) -> Timing:
+    """Times of a stage, `n` is 0 where it did not run."""
+    taken = table.values("timing", stage)
+    found = quantiles(taken)
+    return Timing(
+        mean=float(taken.mean()) if len(taken) else None,
+        median=number(found.median),
+        p95=number(found.p95),
+        n=len(taken),
+    )
 
 
-def _values(values: ArrayLike) -> QuantileValues:
-    return QuantileValues(**{k: number(v) for k, v in asdict(quantiles(values)).items()})
+def _values(found: Quantiles) -> QuantileValues:
+    return QuantileValues(**{name: number(value) for name, value in asdict(found).items()})
 
 
-def _lists(columns: list[ArrayLike]) -> QuantileLists:
-    spreads = [asdict(quantiles(column)) for column in columns]
+def _lists(found: list[Quantiles]) -> QuantileLists:
     names = QuantileLists.model_fields
-    return QuantileLists(**{name: [number(s[name]) for s in spreads] for name in names})
-
-
-def _median(values: ArrayLike) -> float | None:
-    return number(quantiles(with_failures(values)).median)
+    return QuantileLists(**{name: [number(getattr(one, name)) for one in found] for name in names})

@@ -22,7 +22,7 @@ from airground.io.tum import write_tum
 from airground.slam.front_end import FrontEnd, TrackedPose
 from evaluation.setup.checked_json import number
 from evaluation.setup.progress import step
-from evaluation.setup.text import percent, seconds
+from evaluation.setup.text import metres, percent, seconds
 from evaluation.table.tracked_share import tracked_share_of
 from evaluation.table.trajectory_error import trajectory_error
 
@@ -139,8 +139,9 @@ def print_alone(summary: dict[str, Any], console: Console | None = None) -> None
                 f"{name} poses, error", "truth unknown" if summary["tracked_fraction"] else "-"
             )
             continue
-        shown.add_row(f"{name} poses, RMS after SE3", f"{100 * error['ate_se3_rmse_m']:.2f} cm")
-        shown.add_row(f"{name} poses, RMS after Sim3", f"{100 * error['ate_sim3_rmse_m']:.2f} cm")
+        shown.add_row(f"{name} poses, RMS after SE3", metres(error["ate_se3_rmse_m"]))
+        shown.add_row(f"{name} poses, RMS after Sim3", metres(error["ate_sim3_rmse_m"]))
+        shown.add_row(f"{name} poses, RMS over 1 m of path", metres(error["rpe_1m_rmse_m"]))
         shown.add_row(f"{name} poses, scale error", f"{100 * error['scale_error']:+.2f} %")
     (console or Console()).print(shown)
 
@@ -162,7 +163,7 @@ def of_pose_frame(cameras: Trajectory, T_pose_camera: SE3) -> Trajectory:
 
 def error_against(
     true_pose: Callable[[int], SE3 | None] | None, cameras: Trajectory | None
-) -> dict[str, float] | None:
+) -> dict[str, float | None] | None:
     """Absolute trajectory error over the images whose true pose is known."""
     if cameras is None or true_pose is None:
         return None
@@ -182,4 +183,5 @@ def error_against(
         "ate_se3_rmse_m": error.se3_rmse_m,
         "ate_sim3_rmse_m": error.sim3_rmse_m,
         "scale_error": error.scale_error,
+        "rpe_1m_rmse_m": number(error.rpe_1m_rmse_m),
     }

@@ -27,7 +27,7 @@ from evaluation.run.onlooker import Onlooker, Seen
 from evaluation.run.tracking import TrackingHere, TrackingTask, localizer_rng
 from evaluation.setup.checked_json import number
 from evaluation.setup.setups import Setup
-from evaluation.setup.text import percent, seconds
+from evaluation.setup.text import metres, percent, seconds
 from evaluation.table.tracked_share import tracked_share_of
 from evaluation.table.tracking_log import Tracked
 from evaluation.table.true_camera import true_camera
@@ -156,8 +156,9 @@ def print_pair(summary: dict[str, Any], console: Console | None = None) -> None:
         shown.add_row(f"{name}: tracked", percent(robot["tracked_fraction"]))
         shown.add_row(f"{name}: first pose after", seconds(robot["first_pose_s"]))
         error = robot["error"]["final"]
-        rms = "truth unknown" if error is None else f"{100 * error['ate_se3_rmse_m']:.2f} cm"
-        shown.add_row(f"{name}: RMS after SE3", rms)
+        for title, key in (("RMS after SE3", "ate_se3_rmse_m"), ("over 1 m", "rpe_1m_rmse_m")):
+            rms = "truth unknown" if error is None else metres(error[key])
+            shown.add_row(f"{name}: {title}", rms)
     (console or Console()).print(shown)
 
 

@@ -39,20 +39,20 @@ def formatted(value: float | None, form: str, infinite: str = FAILED) -> str:
     return infinite if math.isinf(value) else form.format(value)
 
 
-def metres(value: float | None) -> str:
-    """Millimetres below `FINE_M`, metres above."""
+def metres(value: float | None, decimals: int = 1, sign: str = "") -> str:
+    """Millimetres below `FINE_M`, else metres with one more decimal; `sign` "+" for a change."""
     if value is not None and abs(value) < FINE_M:
-        return f"{1e3 * value:.1f} mm"
-    return formatted(value, "{:.2f} m")
+        return f"{1e3 * value:{sign}.{decimals}f} mm"
+    return formatted(value, f"{{:{sign}.{decimals + 1}f}} m")
 
 
-def degrees(value: float | None) -> str:
-    return formatted(value, "{:.2f}°")
+def degrees(value: float | None, decimals: int = 2, sign: str = "") -> str:
+    return formatted(value, f"{{:{sign}.{decimals}f}}°")
 
 
-def percent(value: float | None, decimals: int = 1) -> str:
+def percent(value: float | None, decimals: int = 1, sign: str = "") -> str:
     """A share of 1 in percent."""
-    return formatted(None if value is None else 100 * value, f"{{:.{decimals}f}} %")
+    return formatted(None if value is None else 100 * value, f"{{:{sign}.{decimals}f}} %")
 
 
 def seconds(value: float | None) -> str:

@@ -1,4 +1,4 @@
-"""What a sweep found: its files, and its table on the screen."""
+"""The results of a sweep: its files, and its table on the screen."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from rich.box import SIMPLE
 from rich.console import Console
-from rich.table import Table
 
-from evaluation.judge.readings import QUANTITIES, Measured, Quantity, Reading
+from evaluation.judge.metrics import Metric
+from evaluation.judge.readings import Reading
+from evaluation.judge.sweep import SWEPT, Measured
 from evaluation.measure.plans.dials import Point, Value, unit_of
 from evaluation.measure.plans.sweep import SweepPlan
 from evaluation.measure.work.code_version import code_version
 from evaluation.setup.run_info import RunInfo
 from evaluation.setup.settings import write_config
+from evaluation.setup.text import MISSING, TextTable, percent, print_table
 from evaluation.show.figures.style import save_figure
 from evaluation.show.figures.sweep_curves import sweep_figure
 
@@ -87,34 +88,40 @@ def _numbers(reading: Reading) -> dict[str, float | None]:
 def print_sweep(
     plan: SweepPlan, measured: Sequence[Measured], console: Console | None = None
 ) -> None:
-    """Print a row for each point: where the dials stand, and what is read there."""
-    shown = Table(
-        title=f"{', '.join(scene.name for scene in plan.scenes)}: "
+    """Print a row for each point: values of the dials, and what is read there."""
+    names = [vary.name for vary in plan.varied]
+    rows = [
+        (
+            *(str(at.point[name]) for name in names),
+            *(_text(metric, at.readings[key]) for key, metric in SWEPT.items()),
+        )
+        for at in measured
+    ]
+    print_table(
+        # A screen is narrow.
+        TextTable(
+            (
+                *(name.replace(".", ".\n") for name in names),
+                *(m.title.replace(" after", "\nafter") for m in SWEPT.values()),
+            ),
+            tuple(rows),
+        ),
+        f"{', '.join(scene.name for scene in plan.scenes)}: "
         + plan.setup.condition(plan.sensors.name).label(),
-        caption="within 0.5 and 0.25 m after so many aerial maps, then refined; 95 % intervals; "
-        "failures count as failures",
-        box=SIMPLE,
-        title_justify="left",
-        caption_justify="left",
+        "shares or medians with 95 % intervals; failures count as failures",
+        console=console,
+        left=(),
+        bold=range(len(names)),
+        compact=True,
     )
-    for vary in plan.varied:
-        name = vary.name.replace(".", ".\n")  # a screen is narrow
-        shown.add_column(name, justify="right", style="bold", overflow="fold")
-    for quantity in QUANTITIES:
-        shown.add_column(quantity.short, justify="right")
-    for at in measured:
-        dials = [str(at.point[vary.name]) for vary in plan.varied]
-        shown.add_row(*dials, *(_text(q, at.readings[q.name]) for q in QUANTITIES))
-    (console or Console()).print(shown)
 
 
-def _text(quantity: Quantity, reading: Reading) -> str:
+def _text(metric: Metric, reading: Reading) -> str:
     if reading.count == 0:
-        return "-"
-    scale, form = {"%": (100, "{:.0f}"), "m": (1000, "{:.1f}"), "deg": (1, "{:.2f}")}[quantity.unit]
-    unit = {"%": " %", "m": " mm", "deg": "°"}[quantity.unit]
+        return MISSING
     value, low, high = (
-        form.format(scale * number) if math.isfinite(number) else "∞"
+        percent(number, 0) if metric.share else metric.text(number)
         for number in (reading.value, reading.low, reading.high)
     )
-    return f"{value}{unit}\n[{low}, {high}]"
+    unit = value.lstrip("0123456789.-")
+    return f"{value}\n[{low.removesuffix(unit)}, {high.removesuffix(unit)}]"

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from evaluation.setup.text import MISSING, percent
+
 
 @dataclass(frozen=True)
 class Interval:
@@ -29,6 +31,13 @@ class Rate:
     @property
     def share(self) -> float:
         return self.successes / self.total if self.total else float("nan")
+
+    def text(self) -> str:
+        """The share; on a second line the counts and the interval."""
+        if self.total == 0:
+            return MISSING
+        interval = f"{100 * self.low:.0f} to {100 * self.high:.0f} %"
+        return f"{percent(self.share)}\n{self.successes} of {self.total}; {interval}"
 
 
 @dataclass(frozen=True)

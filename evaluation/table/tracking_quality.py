@@ -33,6 +33,8 @@ def add_tracking(out: RowWriter, tracked: Tracked, true_pose: Callable[[int], SE
         out.add(STAGE, f"{robot}_{prefix}ate_se3_rmse_m", error.se3_rmse_m, "m")
         out.add(STAGE, f"{robot}_{prefix}ate_sim3_rmse_m", error.sim3_rmse_m, "m")
         out.add(STAGE, f"{robot}_{prefix}scale_error", error.scale_error, "")
+        if np.isfinite(error.rpe_1m_rmse_m) or np.isnan(error.se3_rmse_m):
+            out.add(STAGE, f"{robot}_{prefix}rpe_1m_rmse_m", error.rpe_1m_rmse_m, "m")
         if not prefix:
             out.add(STAGE, f"{robot}_path_m", error.path_m, "m")
         for time_s, value in _over_time(front_end, poses, true_pose):

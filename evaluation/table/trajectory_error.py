@@ -1,4 +1,4 @@
-"""Absolute trajectory error, by evo, with the alignment in the name of every number."""
+"""Trajectory errors by evo, with the alignment in the name of every absolute one."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from evo.core import metrics
+from evo.core.filters import FilterException
 from evo.core.geometry import GeometryException
 from evo.core.trajectory import PoseTrajectory3D
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ from airground.core.se3 import SE3
 
 MIN_POSES = 3
 """Fewer poses can be brought onto any others."""
+RELATIVE_M = 1.0
+"""True path between the two poses of a relative error [m]:
+`evo_rpe tum TRUE ESTIMATE -d 1 -u m --all_pairs --pairs_from_reference`."""
 
 
 @dataclass(frozen=True)
@@ -26,12 +30,15 @@ class TrajectoryError:
         se3_rmse_m: RMS position error after SE3 alignment [m].
         sim3_rmse_m: RMS position error after Sim3 alignment [m].
         scale_error: Scale of the Sim3 alignment minus one: above zero, the estimate is small.
+        rpe_1m_rmse_m: RMS translation error over all pairs of poses that are `RELATIVE_M` of the
+            true path apart, which needs no alignment [m]; NaN for a shorter path.
         path_m: Length of the true path [m].
     """
 
     se3_rmse_m: float
     sim3_rmse_m: float
     scale_error: float
+    rpe_1m_rmse_m: float
     path_m: float
 
 
@@ -40,20 +47,22 @@ def trajectory_error(
 ) -> TrajectoryError:
     """Compare tracked poses with the truth at the same stamps [ns]."""
     if len(poses) < MIN_POSES:
-        return TrajectoryError(np.nan, np.nan, np.nan, 0.0)
+        return TrajectoryError(np.nan, np.nan, np.nan, np.nan, 0.0)
     reference = _evo([(stamp, true_pose(stamp)) for stamp, _ in poses])
     se3, sim3 = _evo(poses), _evo(poses)
+    relative_m, path_m = _relative_rmse(deepcopy(reference), _evo(poses)), reference.path_length
     try:
         se3.align(deepcopy(reference))
         _, _, scale = sim3.align(deepcopy(reference), correct_scale=True)
     except GeometryException:
         # poses on one point or line can be turned at will
-        return TrajectoryError(np.nan, np.nan, np.nan, reference.path_length)
+        return TrajectoryError(np.nan, np.nan, np.nan, relative_m, path_m)
     return TrajectoryError(
         _rmse(_errors(reference, se3)),
         _rmse(_errors(reference, sim3)),
         float(scale) - 1.0,
-        reference.path_length,
+        relative_m,
+        path_m,
     )
 
 
@@ -83,6 +92,21 @@ def _errors(reference: PoseTrajectory3D, estimate: PoseTrajectory3D) -> NDArray[
     error = metrics.APE(metrics.PoseRelation.translation_part)
     error.process_data((reference, estimate))
     return np.asarray(error.error, np.float64)
+
+
+def _relative_rmse(reference: PoseTrajectory3D, estimate: PoseTrajectory3D) -> float:
+    error = metrics.RPE(
+        metrics.PoseRelation.translation_part,
+        RELATIVE_M,
+        metrics.Unit.meters,
+        all_pairs=True,
+        pairs_from_reference=True,
+    )
+    try:
+        error.process_data((reference, estimate))
+    except FilterException:  # no two poses are that far apart
+        return float("nan")
+    return _rmse(np.asarray(error.error, np.float64))
 
 
 def _rmse(errors: NDArray[np.float64]) -> float:

@@ -10,11 +10,11 @@ from typing import Any
 from evaluation.judge.runs import Against, Run
 from evaluation.judge.samples import Flight
 from evaluation.judge.verdict import MOVED, Judged
+from evaluation.setup.text import MISSING, TextTable
 from evaluation.show.comparison.figures import comparison_figures
 from evaluation.show.comparison.verdict_table import HEADER, cells, conclusion, conditions
 from evaluation.show.report.failures import Failure, failures
 from evaluation.show.report.page import rendered, saved_picture
-from evaluation.show.report.tables import MISSING, TextTable
 
 PAGE = "compare.html"
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
 from evaluation.judge.metrics import Metric
 from evaluation.judge.verdict import ALPHA, MOVED, Comparison, Judged, Verdict
+from evaluation.setup.text import MISSING, TextTable, print_table
 
-MISSING = "-"
 HEADER = ("metric", "accepted", "now", "change", "95 % interval", "p", "compared", "verdict")
 NARROW = ("metric", "accepted", "now", "change", "verdict")
 """What fits a terminal of 80 characters; with `WIDE` all of it does."""
@@ -27,7 +25,7 @@ STYLES = {
 def cells(judged: Judged) -> tuple[str, ...]:
     """One row below `HEADER`."""
     metric, compared = judged.metric, judged.compared
-    head = (metric.title, _figure(metric, judged.before), _figure(metric, judged.after))
+    head = (metric.title, metric.fine_text(judged.before), metric.fine_text(judged.after))
     if compared is None:
         return (*head, MISSING, MISSING, MISSING, MISSING, str(judged.verdict))
     effect = compared.effect
@@ -73,24 +71,20 @@ def conditions(comparison: Comparison) -> str:
 
 def print_comparison(comparison: Comparison, console: Console | None = None) -> None:
     """The table on the screen."""
-    shown = Table(
-        title=conclusion(comparison),
-        caption=conditions(comparison),
-        title_justify="left",
-        caption_justify="left",
-        box=box.SIMPLE_HEAD,
-        padding=(0, 1, 0, 0),
-    )
     console = console or Console()
-    wide = console.width >= WIDE
-    kept = [index for index, name in enumerate(HEADER) if wide or name in NARROW]
-    for index in kept:
-        left = HEADER[index] in ("metric", "verdict")
-        shown.add_column(HEADER[index], justify="left" if left else "right")
-    for judged in comparison.judged:
-        row = cells(judged)
-        shown.add_row(*(row[index] for index in kept), style=STYLES.get(judged.verdict, ""))
-    console.print(shown)
+    kept = [n for n, name in enumerate(HEADER) if console.width >= WIDE or name in NARROW]
+    rows = [cells(judged) for judged in comparison.judged]
+    print_table(
+        TextTable(
+            tuple(HEADER[n] for n in kept), tuple(tuple(row[n] for n in kept) for row in rows)
+        ),
+        conclusion(comparison),
+        conditions(comparison),
+        console=console,
+        left=(0, len(kept) - 1),
+        styles=[STYLES.get(judged.verdict, "") for judged in comparison.judged],
+        compact=True,
+    )
 
 
 def markdown(comparison: Comparison) -> str:
@@ -144,26 +138,7 @@ def _certainty(judged: Judged) -> tuple[str, str]:
     return interval, "< 0.001" if judged.p < 0.001 else f"{judged.p:.3f}"
 
 
-def _figure(metric: Metric, value: float) -> str:
-    if np.isnan(value):
-        return MISSING
-    return "failed" if np.isinf(value) else _number(metric, value, "")
-
-
 def _change(metric: Metric, value: float) -> str:
     if np.isinf(value):
         return "fails" if value > 0 else "no longer fails"
-    return _number(metric, value, "+")
-
-
-def _number(metric: Metric, value: float, sign: str) -> str:
-    """With three digits or so, in the unit that people say."""
-    if metric.unit == "m":
-        return f"{1e3 * value:{sign}.{2 if abs(value) < 0.1 else 1}f} mm"
-    if metric.unit == "deg":
-        return f"{value:{sign}.3f}°"
-    if metric.unit == "count":
-        return f"{value:{sign}.1f}"
-    if metric.unit == "cost":
-        return f"{value:{sign}.3f}"
-    return f"{100 * value:{sign}.1f} %"
+    return metric.fine_text(value, "+")

@@ -10,7 +10,8 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from evaluation.judge.readings import QUANTITIES, Measured, Quantity
+from evaluation.judge.metrics import Metric
+from evaluation.judge.sweep import SWEPT, Measured
 from evaluation.measure.plans.dials import Point, Value, unit_of
 from evaluation.show.figures.style import SERIES, SMALL_PT, WIDE_IN, styled
 
@@ -23,7 +24,7 @@ COLUMNS = 3
 @styled
 def sweep_figure(plan: SweepPlan, measured: Sequence[Measured]) -> Figure:
     """The first dial along x; a line for each combination of the others."""
-    rows = -(-len(QUANTITIES) // COLUMNS)
+    rows = -(-len(SWEPT) // COLUMNS)
     figure = Figure(figsize=(WIDE_IN, 2.3 * rows), layout="constrained")
     grid = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
     first, *others = (vary.name for vary in plan.varied)
@@ -31,12 +32,12 @@ def sweep_figure(plan: SweepPlan, measured: Sequence[Measured]) -> Figure:
     for at in measured:
         lines.setdefault(_words(at.point, others), []).append(at)
     places = _places([value for vary in plan.varied[:1] for value in vary.values])
-    for axes, quantity in zip(grid, QUANTITIES, strict=False):
+    for axes, (key, metric) in zip(grid, SWEPT.items(), strict=False):
         for colour, (label, line) in zip(_colours(len(lines)), lines.items(), strict=True):
-            _curve(axes, quantity, [places[repr(at.point[first])] for at in line], line, colour)
+            _curve(axes, key, [places[repr(at.point[first])] for at in line], line, colour)
             axes.lines[-1].set_label(label)
-        _finish(axes, quantity, first, places)
-    for axes in grid[len(QUANTITIES) :]:
+        _finish(axes, metric, first, places)
+    for axes in grid[len(SWEPT) :]:
         axes.set_axis_off()
     if others:
         handles, labels = grid[0].get_legend_handles_labels()
@@ -45,12 +46,10 @@ def sweep_figure(plan: SweepPlan, measured: Sequence[Measured]) -> Figure:
     return figure
 
 
-def _curve(
-    axes: Axes, quantity: Quantity, x: list[float], line: list[Measured], colour: object
-) -> None:
+def _curve(axes: Axes, key: str, x: list[float], line: list[Measured], colour: object) -> None:
     """Values joined by a line, and their intervals; what is infinite leaves a gap."""
-    scale = 100.0 if quantity.unit == "%" else 1.0
-    read = [at.readings[quantity.name] for at in line]
+    scale = 100.0 if SWEPT[key].share else 1.0
+    read = [at.readings[key] for at in line]
     value, low, high = (
         scale * np.array([getattr(reading, part) for reading in read])
         for part in ("value", "low", "high")
@@ -63,13 +62,13 @@ def _curve(
     axes.plot(at, shown, color=colour, marker="o", markersize=4, linewidth=1.6)  # type: ignore[arg-type]
 
 
-def _finish(axes: Axes, quantity: Quantity, dial: str, places: dict[str, float]) -> None:
-    if quantity.unit == "%":
+def _finish(axes: Axes, metric: Metric, dial: str, places: dict[str, float]) -> None:
+    if metric.share:
         axes.set_ylim(0, 103)
-        axes.set_title(f"% {quantity.title}", fontsize=SMALL_PT)
+        axes.set_title(f"% {metric.title}", fontsize=SMALL_PT)
     else:
         axes.set_ylim(bottom=0)
-        axes.set_title(f"{quantity.title} [{quantity.unit}]", fontsize=SMALL_PT)
+        axes.set_title(f"{metric.title}, median [{metric.unit}]", fontsize=SMALL_PT)
     words = [text.strip("'") for text in places]
     axes.set_xticks(list(places.values()), words, rotation=0 if len(words) < 7 else 45)
     unit = unit_of(dial)
@@ -102,8 +101,8 @@ def _caption(plan: SweepPlan, measured: Sequence[Measured]) -> str:
     condition = plan.setup.condition(plan.sensors.name).label()
     scenes = ", ".join(scene.name for scene in plan.scenes)
     counts = {
-        quantity.counted: sorted({at.readings[quantity.name].count for at in measured})
-        for quantity in QUANTITIES
+        f"{metric.each}s": sorted({at.readings[key].count for at in measured})
+        for key, metric in SWEPT.items()
     }
     numbers = ", ".join(
         f"{low} {what}" if low == high else f"{low} to {high} {what}"

@@ -1,4 +1,4 @@
-"""Baselines beside ours: who finds the MAV from one aerial map, and who errs."""
+"""Baselines beside ours: which methods find the MAV from one aerial map, and which err."""
 
 from __future__ import annotations
 
@@ -8,22 +8,19 @@ import pandas as pd
 from evaluation.measure.baselines.interface import Baseline
 from evaluation.measure.baselines.measure import STAGE
 from evaluation.measure.baselines.table import BASELINES
-from evaluation.show.report.tables import MISSING, TextTable, degrees, metres, milliseconds, rate
+from evaluation.setup.text import MISSING, TextTable, degrees, metres, milliseconds
 from evaluation.table.intervals import quantile, wilson
+from evaluation.table.limits import GOOD_POSE, LOCATED_M, is_good_pose
 from evaluation.table.rows import TRIAL_KEYS, ResultTable
-
-NEAR_M = 0.25
-"""A claim farther off than this in the horizontal plane is a wrong claim."""
-
 
 HEADER = (
     "method",
     "is given",
     "n",
-    "claims a place within 0.25 m",
+    f"claims a place within {LOCATED_M:g} m",
     "wrong claims",
-    "claims within 5 cm and 2°",
-    "best guess within 0.25 m",
+    f"claims within {GOOD_POSE}",
+    f"best guess within {LOCATED_M:g} m",
     "best guess, median error",
     "median time [ms]",
 )
@@ -56,15 +53,15 @@ def _cells(table: ResultTable, baseline: Baseline) -> tuple[str, ...]:
     if n == 0:
         return ()
     claimed = trials["claimed"] > 0
-    near = trials["horizontal_m"] <= NEAR_M
-    precise = (trials["translation_m"] <= 0.05) & (trials["rotation_deg"] <= 2.0)
+    near = trials["horizontal_m"] <= LOCATED_M
+    precise = is_good_pose(trials["translation_m"], trials["rotation_deg"])
     shares = (claimed & near, claimed & ~near, claimed & precise, near)
     off_m, off_deg = (quantile(trials[c], 0.5) for c in ("translation_m", "rotation_deg"))
     return (
         baseline.title,
         baseline.given,
         str(n),
-        *(rate(wilson(int(share.sum()), n)) for share in shares),
+        *(wilson(int(share.sum()), n).text() for share in shares),
         f"{metres(off_m)}\n{degrees(off_deg)}",
         milliseconds(quantile(trials["ms"], 0.5)),
     )
@@ -72,7 +69,7 @@ def _cells(table: ResultTable, baseline: Baseline) -> tuple[str, ...]:
 
 def _claims(table: ResultTable, baseline: Baseline) -> str:
     claimed = baseline_trials(table, baseline.name)["claimed"] > 0
-    return rate(wilson(int(claimed.sum()), len(claimed)))
+    return wilson(int(claimed.sum()), len(claimed)).text()
 
 
 def baseline_trials(table: ResultTable, name: str) -> pd.DataFrame:

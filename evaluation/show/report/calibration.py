@@ -1,4 +1,4 @@
-"""The report's word on trust: what is claimed where, and whether the particles know their error."""
+"""The report on trust: claims case by case, and whether the particles' spread fits their error."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from evaluation.judge.claims import (
 )
 from evaluation.measure.protocol.negatives import NO_OVERLAP, WRONG_MAP
 from evaluation.setup.condition import Condition
+from evaluation.setup.text import MISSING, TextTable, formatted
 from evaluation.show.figures.calibration import calibration_figure
 from evaluation.show.gallery.figures import ReportFigure
-from evaluation.show.report.tables import MISSING, TextTable, rate
 from evaluation.table.rows import ResultTable
 
 TITLES = {
     TO_BE_FOUND: "a place to find",
-    NO_STRUCTURE: "flat: nothing to tell it by",
+    NO_STRUCTURE: "flat: no structure",
     NO_OVERLAP.stage: "no overlap",
     WRONG_MAP.stage: "another scene's ground map",
     ALL: "all together",
@@ -56,7 +56,7 @@ def claims_table(table: ResultTable) -> TextTable:
 def _cells(claims: Claims | None) -> tuple[str, str, str]:
     if claims is None:
         return "0", MISSING, MISSING
-    return str(claims.accepted.total), rate(claims.accepted), rate(claims.wrong)
+    return str(claims.accepted.total), claims.accepted.text(), claims.wrong.text()
 
 
 def calibration_table(table: ResultTable) -> TextTable:
@@ -69,7 +69,7 @@ def calibration_table(table: ResultTable) -> TextTable:
     rows += [
         (
             f"true position in the {100 * share:.0f} % ellipse",
-            *(rate(part.coverage(share)) for part in parts),
+            *(part.coverage(share).text() for part in parts),
         )
         for share in ELLIPSES
     ]
@@ -78,7 +78,7 @@ def calibration_table(table: ResultTable) -> TextTable:
         ("normalized error, median", Localizations.median_normalized_error),
         ("rank correlation of spread and error", Localizations.rank_correlation),
     ):
-        rows.append((title, *(_ratio(read(part)) for part in parts)))
+        rows.append((title, *(formatted(read(part), "{:.2f}", "infinite") for part in parts)))
     return TextTable(("", "all", "accepted"), tuple(rows))
 
 
@@ -88,10 +88,10 @@ def calibration_figures(table: ResultTable, condition: Condition) -> Iterator[Re
     if len(found):
         yield ReportFigure(
             "calibration",
-            "Calibration: does the spread tell the error?",
+            "Calibration: does the spread fit the error?",
             "Left: how often the true position lies in the ellipse of the particles' covariance "
             "around the reported position, with 95 % Wilson intervals at 50, 90 and 99 %. Below "
-            "the dashed line, particles are surer than they should be. Right: error and spread of "
+            "the dashed line the particles are overconfident. Right: error and spread of "
             "each localization. Aerial maps of one sequence are not independent. "
             f"{_beyond(found)}{condition.label()}.",
             calibration_figure(found),
@@ -103,9 +103,3 @@ def _beyond(found: Localizations) -> str:
     if collapsed == 0:
         return ""
     return f"{collapsed} beliefs had all particles in one place: in no ellipse. "
-
-
-def _ratio(value: float) -> str:
-    if np.isnan(value):
-        return MISSING
-    return f"{value:.2f}" if np.isfinite(value) else "infinite"

@@ -10,10 +10,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from evaluation.setup.condition import Condition
+from evaluation.setup.text import TextTable, degrees, metres
 from evaluation.show.figures.style import SERIES, WIDE_IN, styled
 from evaluation.show.gallery.figures import ReportFigure
-from evaluation.show.report.tables import TextTable, degrees, metres, rate
 from evaluation.table.intervals import quantile, wilson
+from evaluation.table.limits import GOOD_POSE, is_good_pose
 from evaluation.table.rows import ResultTable
 
 
@@ -74,16 +75,16 @@ def budget_table(table: ResultTable) -> TextTable:
     """One row a stand-in."""
     rows = []
     for name, (position, angle) in _errors(table).items():
-        good = (position <= 0.05) & (angle <= 2.0)
+        good = is_good_pose(position, angle)
         rows.append(
             (
                 name,
                 f"{metres(quantile(position, 0.5))}\n95 %: {metres(quantile(position, 0.95))}",
                 f"{degrees(quantile(angle, 0.5))}\n95 %: {degrees(quantile(angle, 0.95))}",
-                rate(wilson(int(good.sum()), len(good))),
+                wilson(int(good.sum()), len(good)).text(),
             )
         )
-    header = ("true is", "position error, median", "angle error, median", "within 5 cm and 2°")
+    header = ("true is", "position error, median", "angle error, median", f"within {GOOD_POSE}")
     return TextTable(header, tuple(rows))
 
 

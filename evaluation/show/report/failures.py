@@ -1,4 +1,4 @@
-"""What went wrong, and what was rightly refused."""
+"""Failed sequences and refinements step by step, and the claims in control scenes."""
 
 from __future__ import annotations
 
@@ -8,12 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from evaluation.setup.condition import Condition
-from evaluation.show.report.tables import MISSING, TextTable, degrees, metres
+from evaluation.setup.text import MISSING, TextTable, degrees, metres
+from evaluation.table.limits import FOURTH_MAP, LOCATED_M, is_good_pose
 from evaluation.table.rows import SEQUENCE_KEYS, ResultTable
-
-JUDGED_AFTER, LOCATED_M = 4, 0.25
-"""A sequence farther off than this after so many aerial maps failed."""
-REFINED_M, REFINED_DEG = 0.05, 2.0
 
 
 @dataclass(frozen=True)
@@ -24,8 +21,8 @@ class Failure:
         kind: "sequence" or "refinement".
         scene, seed, flight, number: Which one.
         result: How it ended.
-        said: What the pipeline said of it.
-        story: Step by step, for who wants to know more.
+        said: What the pipeline reported: a claim, or the reason of a refusal.
+        story: The errors step by step.
     """
 
     kind: str
@@ -73,7 +70,7 @@ def control_table(table: ResultTable, conditions: Sequence[Condition]) -> TextTa
 
 
 def failures(table: ResultTable) -> list[Failure]:
-    """Every failure of one condition: sequences beyond 0.25 m after 4, refinements off."""
+    """Every failure of one condition: sequences off after four maps, refinements not good."""
     return [*_failed_sequences(table), *_failed_trials(table)]
 
 
@@ -81,7 +78,7 @@ def _failed_sequences(table: ResultTable) -> Iterator[Failure]:
     errors, spreads = table.sequences("error_m"), table.sequences("spread_m")
     if len(errors) == 0:
         return
-    judged = min(JUDGED_AFTER, errors.shape[1])
+    judged = min(FOURTH_MAP, errors.shape[1])
     notes = table.rows("localization", "converged").set_index([*SEQUENCE_KEYS, "iteration"])["note"]
     for key, error, spread in zip(
         errors.index.to_list(),
@@ -123,7 +120,7 @@ def _failed_trials(table: ResultTable) -> Iterator[Failure]:
     for key, trial in zip(trials.index.to_list(), trials.to_dict("records"), strict=True):
         accepted = trial.get("accepted", 1.0) > 0
         off_m, off_deg = trial["after_translation_m"], trial["after_rotation_deg"]
-        if accepted and off_m <= REFINED_M and off_deg <= REFINED_DEG:
+        if accepted and is_good_pose(off_m, off_deg):
             continue
         scene, seed, flight, _, number = key
         steps = tuple(

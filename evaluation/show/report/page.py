@@ -25,9 +25,8 @@ from evaluation.show.report.calibration import calibration_table, claims_table
 from evaluation.show.report.error_budget import budget_table
 from evaluation.show.report.failures import control_table, failures
 from evaluation.show.report.figures import report_figures
-from evaluation.show.report.headline import headlines
 from evaluation.show.report.screen import live_table
-from evaluation.show.report.tables import comparison_table, scene_table, timing_table
+from evaluation.show.report.tables import comparison_table, headlines, scene_table, timing_table
 from evaluation.show.report.trajectories import trajectory_table
 from evaluation.table.rows import ResultTable
 
@@ -73,7 +72,7 @@ def write_report(
         condition=shown[0].label(),
         scenes=measured.scenes(),
         run=run,
-        headlines=headlines(measured, run.seed),
+        headlines=headlines(measured),
         comparison=comparison_table(table, shown),
         shared=shared_parts(shown) if len(shown) > 1 else shown[0].label(),
         pictures=[saved_picture(f, out) for f in report_figures(table, shown, showcase)],

@@ -5,66 +5,67 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from rich.console import Console
-from rich.table import Table
 
 from evaluation.judge.claims import ALL
 from evaluation.judge.live_summary import DEADLINE_MS, Latency, LiveRobot, LiveSummary, live_summary
+from evaluation.judge.metrics import METRICS
+from evaluation.judge.poses import ROBOTS, SlamRobot
 from evaluation.judge.summary import Summary
-from evaluation.show.report.tables import MISSING, TextTable
+from evaluation.setup.text import (
+    MISSING,
+    TextTable,
+    degrees,
+    formatted,
+    metres,
+    percent,
+    print_table,
+    seconds,
+)
+from evaluation.show.report.tables import SEQUENCES, TRIALS
 from evaluation.table.rows import ResultTable
 
 
 def print_summary(summary: Summary, console: Console | None = None) -> None:
     """Print the headline numbers of a summary beside the paper's."""
     poses = {"oracle": "oracle poses", "slam": "poses from SLAM"}[summary.poses]
-    shown = Table(
-        title=f"{', '.join(summary.scenes)}: preset {summary.preset}, {poses}",
-        caption="same protocol, simulated; the paper: real robots",
-        title_justify="left",
-        caption_justify="left",
+    print_table(
+        TextTable(("", "here", "paper"), tuple(_rows(summary))),
+        f"{', '.join(summary.scenes)}: preset {summary.preset}, {poses}",
+        "same protocol, simulated; the paper: real robots",
+        console=console,
+        bold=(1,),
     )
-    shown.add_column("")
-    shown.add_column("here", justify="right", style="bold")
-    shown.add_column("paper", justify="right")
-    for row in _rows(summary):
-        shown.add_row(*row)
-    console = console or Console()
-    console.print(shown)
     if summary.realtime is not None:
-        console.print(_live(summary.realtime))
-
-
-def _live(summary: LiveSummary) -> Table:
-    shown = Table(title="live", caption="latencies: median, 95 %, worst", title_justify="left")
-    for header in ("", "MAV", "ground robot"):
-        shown.add_column(header, justify="right" if header else "left")
-    for row in live_rows(summary):
-        shown.add_row(*row)
-    return shown
+        live = TextTable(("", "MAV", "ground robot"), live_rows(summary.realtime))
+        print_table(live, "live", "latencies: median, 95 %, worst", console=console)
 
 
 def _rows(summary: Summary) -> list[tuple[str, str, str]]:
-    localization, refinement = summary.localization, summary.refinement
-    within = (
-        ("within 0.5 m after 1 aerial map", localization.within_0_50_m, 1, "65 %"),
-        ("within 0.25 m after 4", localization.within_0_25_m, 4, "89 %"),
-    )
-    rows = [("sequences", str(localization.sequences), "41")]
-    for title, shares, iteration, paper in within:
-        share = shares[iteration - 1] if len(shares) >= iteration else None
-        rows.append((title, _percent(share), paper))
+    localization, refinement, surface = summary.localization, summary.refinement, summary.surface
     after = refinement.after
-    rows += [
-        ("refinement trials", str(refinement.trials), "67"),
-        ("refined, median position", _millimetres(after.translation_m.median), "76 mm"),
-        ("refined, median angle", _text(after.rotation_deg.median, "{:.2f}°"), "3.0°"),
-        ("refined within 5 cm and 2°", _percent(refinement.within_5cm_2deg), "-"),
+    values = {
+        "within_50cm_1": percent(_at(localization.within_0_50_m, 1)),
+        "within_25cm_4": percent(_at(localization.within_0_25_m, 4)),
+        "refined_translation": metres(after.translation_m.median),
+        "refined_rotation": degrees(after.rotation_deg.median),
+        "refined_well": percent(refinement.within_5cm_2deg),
+        "surface_median": metres(surface.error_median_m),
+        "completeness": percent(surface.completeness),
+    }
+    metrics = [(METRICS[name].title, text, METRICS[name].paper) for name, text in values.items()]
+    return [
+        ("sequences", str(localization.sequences), SEQUENCES),
+        ("refinement trials", str(refinement.trials), TRIALS),
+        *metrics,
         *_claims(summary),
-        ("fused surface, median error", _millimetres(summary.surface.error_median_m), "-"),
-        ("fused surface, completeness", _percent(summary.surface.completeness), "-"),
-        ("recorded s / processing s", _text(summary.real_time_factor, "{:.2f}"), "real time"),
+        *_poses("mav", summary.slam.mav),
+        *_poses("ground", summary.slam.ground),
+        ("recorded s / processing s", formatted(summary.real_time_factor, "{:.2f}"), "real time"),
     ]
-    return rows
+
+
+def _at(shares: list[float], iteration: int) -> float | None:
+    return shares[iteration - 1] if len(shares) >= iteration else None
 
 
 def _claims(summary: Summary) -> list[tuple[str, str, str]]:
@@ -73,32 +74,33 @@ def _claims(summary: Summary) -> list[tuple[str, str, str]]:
     if every is None:
         return []
     return [
-        ("localizations that claim a place", _percent(every.accepted.share), "-"),
-        ("wrong among them, all cases", _percent(every.wrong.share), "-"),
+        ("localizations that claim a place", percent(every.accepted.share), MISSING),
+        ("wrong among them, all cases", percent(every.wrong.share), MISSING),
     ]
 
 
-def _text(value: float | None, form: str) -> str:
-    return "-" if value is None else form.format(value)
-
-
-def _percent(value: float | None) -> str:
-    return "-" if value is None else f"{100 * value:.1f} %"
-
-
-def _millimetres(value: float | None) -> str:
-    return "-" if value is None else f"{1e3 * value:.1f} mm"
+def _poses(robot: str, poses: SlamRobot) -> list[tuple[str, str, str]]:
+    """One robot's own poses; nothing where an oracle gave them."""
+    if poses.tracked_fraction is None:
+        return []
+    title, paper = ROBOTS[robot], METRICS[f"{robot}_trajectory"].paper
+    return [
+        (f"{title}: live, RMS error after SE3", metres(poses.ate_se3_rmse_m), paper),
+        (f"{title}: live, RMS error over 1 m", metres(poses.rpe_1m_rmse_m), MISSING),
+        (f"{title}: tracked, from the first motion", percent(poses.tracked_fraction), MISSING),
+        (f"{title}: first pose after", seconds(poses.initialized_s), MISSING),
+    ]
 
 
 def live_table(table: ResultTable) -> TextTable:
-    """How the live runs in a table went; no rows where there was none."""
+    """Measures of the live runs in a table; no rows where there was none."""
     summary = live_summary(table)
     rows = live_rows(summary) if summary is not None else ()
     return TextTable(("", "MAV", "ground robot"), rows)
 
 
 def live_rows(summary: LiveSummary) -> tuple[tuple[str, str, str], ...]:
-    """What is measured, of the MAV, of the ground robot; the mapper's once for both."""
+    """Title, MAV, ground robot; the mapper's measures stand once for both."""
     mav, ground = summary.mav, summary.ground
 
     def each(title: str, cell: Callable[[LiveRobot], str]) -> tuple[str, str, str]:
@@ -113,10 +115,10 @@ def live_rows(summary: LiveSummary) -> tuple[tuple[str, str, str], ...]:
         ("surface located after its last image", _latency(summary.aligned_ms), ""),
         each("most images waiting", lambda robot: str(robot.longest_queue)),
         each("most frames before the mapper", lambda robot: str(robot.most_under_way)),
-        each("sent to the mapper", lambda robot: _live_text(robot.mbit_s, "{:.2f} Mbit/s")),
-        each("processor, of one core", lambda robot: _live_percent(robot.processor_share)),
-        ("processor, mapper", "", _live_percent(summary.mapper_processor_share)),
-        ("peak memory, all processes", "", _live_text(summary.peak_memory_mib, "{:.0f} MiB")),
+        each("sent to the mapper", lambda robot: formatted(robot.mbit_s, "{:.2f} Mbit/s")),
+        each("processor, of one core", lambda robot: percent(robot.processor_share, 0)),
+        ("processor, mapper", "", percent(summary.mapper_processor_share, 0)),
+        ("peak memory, all processes", "", formatted(summary.peak_memory_mib, "{:.0f} MiB")),
     ]
     if min(mav.survived, ground.survived) < summary.runs:
         rows.insert(0, each("survived", lambda robot: f"{robot.survived} of {summary.runs}"))
@@ -124,21 +126,13 @@ def live_rows(summary: LiveSummary) -> tuple[tuple[str, str, str], ...]:
 
 
 def _unmapped(robot: LiveRobot) -> str:
-    """Why frames did not reach the mapper, where some did not."""
+    """Reasons for which frames did not reach the mapper, with counts."""
     reasons = {"no room": robot.shed, "lost by the radio": robot.lost, "late": robot.late}
-    told = [f"{count} {reason}" for reason, count in reasons.items() if count]
-    return ", ".join(told) or "none"
+    found = [f"{count} {reason}" for reason, count in reasons.items() if count]
+    return ", ".join(found) or "none"
 
 
 def _latency(latency: Latency) -> str:
     if latency.median is None or latency.p95 is None or latency.worst is None:
         return MISSING
     return f"{latency.median:.0f}, {latency.p95:.0f}, {latency.worst:.0f} ms"
-
-
-def _live_text(value: float | None, form: str) -> str:
-    return MISSING if value is None else form.format(value)
-
-
-def _live_percent(value: float | None) -> str:
-    return _live_text(None if value is None else 100 * value, "{:.0f} %")

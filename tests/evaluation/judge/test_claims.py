@@ -99,7 +99,7 @@ def test_the_table_has_a_row_for_each_case() -> None:
     assert rows["a place to find"][0] == "5"
     assert rows["a place to find"][1].startswith("60.0 %\n3 of 5;")
     assert rows["a place to find"][2].startswith("33.3 %\n1 of 3;")
-    assert rows["flat: nothing to tell it by"][3:] == ("0", "-", "-")
+    assert rows["flat: no structure"][3:] == ("0", "-", "-")
     assert rows["another scene's ground map"][1].startswith("0.0 %\n0 of 3;")
     assert rows["another scene's ground map"][2] == "-"
     assert rows["all together"][5].startswith("66.7 %\n2 of 3;")

@@ -11,8 +11,8 @@ import pytest
 from rich.console import Console
 
 from airground.config import Config
-from evaluation.judge import readings as module
-from evaluation.judge.readings import Measured, sweep
+from evaluation.judge import sweep as module
+from evaluation.judge.sweep import Measured, sweep
 from evaluation.measure.plans.sweep import SweepPlan, parse_vary
 from evaluation.measure.protocol.trials import Protocol
 from evaluation.measure.work.crew import Crew
