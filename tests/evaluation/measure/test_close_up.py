@@ -34,8 +34,8 @@ RECORDING = cast(
     SimpleNamespace(
         scene="scripted",
         sensors="none",
-        mav_image_at=lambda stamp_ns: run.mav_frame(stamp_ns).image,
-        ground_image_at=lambda stamp_ns: run.ground_frame(stamp_ns).image,
+        mav=SimpleNamespace(image_at=lambda stamp_ns: run.mav_frame(stamp_ns).image),
+        ground=SimpleNamespace(image_at=lambda stamp_ns: run.ground_frame(stamp_ns).image),
     ),
 )
 SOURCES = np.array([Source.GROUND, Source.MAV, Source.MAV], np.uint8)
