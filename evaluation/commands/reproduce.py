@@ -21,7 +21,6 @@ from evaluation.commands.words import (
 
 if TYPE_CHECKING:
     from evaluation.measure.plans.reproduce import Plan
-    from evaluation.measure.plans.suite import SuitePlan
 
 SCENES = ("indoor_a", "indoor_b", "indoor_c", "outdoor", "flat")
 FLIGHTS, SEQUENCES, TRIALS, BASELINES = 2, 6, 9, 12
@@ -107,8 +106,8 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, Cluste
             summary = write_results(results, folder.results)
         print_summary(summary)
 
-    def _suite(self, name: str) -> SuitePlan:
-        from evaluation.measure.plans.suite import SUITES, SuitePlan
+    def _suite(self, name: str) -> Plan:
+        from evaluation.measure.plans.suite import SUITES
         from sim.sensors.presets import sensor_preset
 
         fixed = ("quick", "budget", "scenes", "flights", "sequences_per_flight")
@@ -117,11 +116,11 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, Cluste
                 word = field.replace("_", "-")
                 raise InputError(f"--{word}: the suite {name} is fixed; give --{word} without it")
         sensors = sensor_preset(self.sensors)
-        return SuitePlan(SUITES[name], self.setup(), sensors, self.checked_seed())
+        return SUITES[name].plan(self.setup(), sensors, self.checked_seed())
 
     def plan(self) -> Plan:
         """What the words ask for, checked."""
-        from evaluation.measure.plans.reproduce import Plan
+        from evaluation.measure.plans.reproduce import Plan, flights_over
         from evaluation.measure.protocol.trials import Protocol
         from evaluation.setup.setups import with_companions
         from sim.scene import load_scene
@@ -132,16 +131,18 @@ class Reproduce(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, Cluste
             raise InputError("--budget asks what SLAM loses among others; give --poses slam")
         names = self.scenes or (QUICK_SCENES if self.quick else SCENES)
         return Plan(
-            scenes=[load_scene(name) for name in names],
-            flights=self._count("flights", QUICK_FLIGHTS, FLIGHTS),
+            flights=flights_over(
+                [load_scene(name) for name in names],
+                self._count("flights", QUICK_FLIGHTS, FLIGHTS),
+                sensor_preset(self.sensors),
+                self.checked_seed(),
+            ),
             setups=[setup] if self.alone else with_companions(setup, few=self.quick),
-            sensors=sensor_preset(self.sensors),
             protocol=Protocol(
                 sequences=self._count("sequences_per_flight", QUICK_SEQUENCES, SEQUENCES),
                 trials=self._count("trials", QUICK_TRIALS, TRIALS),
                 baselines=self._count("baselines", QUICK_BASELINES, BASELINES, low=0),
             ),
-            seed=self.checked_seed(),
             budget=self.budget,
             sequences=int(in_range("--sequences", self.sequences or 0)),
         )

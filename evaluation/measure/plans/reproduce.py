@@ -1,10 +1,10 @@
-"""The paper's protocol: scenes x flights, recorded, mapped, localized, refined."""
+"""Plans of flights: each is recorded, and its units are measured."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice
+from itertools import count, islice
 from pathlib import Path
 from types import MappingProxyType
 
@@ -24,119 +24,102 @@ NOTHING: Mapping[str, Path] = MappingProxyType({})
 
 @dataclass(frozen=True)
 class Plan:
-    """What to reproduce.
+    """Flights, and what is measured on each.
 
     Attributes:
-        scenes: Which worlds.
-        flights: How many flights over each.
-        setups: What to measure, the primary setup first.
-        sensors: How good the sensors are.
-        protocol: How much is measured on each recording.
-        seed: Draws the heaps, the flights, the noise and the particles.
-        budget: Whether to measure what each stage of the primary setup loses.
-        sequences: At least so many in all of the primary setup, control scenes apart; 0 for
-            those that the flights give.
+        flights: Flights that are flown in any case.
+        setups: Setups to measure, the primary setup first.
+        protocol: Extent of the measurements on each flight.
+        budget: Whether to measure the error budget of the primary setup.
+        negatives: Whether to try the negative cases with the primary setup.
+        sequences: Smallest number of sequences of the primary setup, control scenes excluded;
+            0 for those that `flights` give.
     """
 
-    scenes: list[Scene]
-    flights: int
+    flights: list[Flight]
     setups: list[Setup]
-    sensors: SensorPreset
     protocol: Protocol
-    seed: int
     budget: bool = False
+    negatives: bool = True
     sequences: int = 0
 
-    def first_flights(self) -> list[Flight]:
-        """Those that are flown in any case."""
-        return [
-            Flight(scene, self.seed, flight, self.sensors)
-            for scene in self.scenes
-            for flight in range(self.flights)
-        ]
-
     def further_flights(self) -> Iterator[Flight]:
-        """Those that follow as far as sequences are wanting: the same with the next seeds."""
-        scenes = [scene for scene in self.scenes if scene.name not in CONTROL_SCENES]
-        seed = self.seed
-        while scenes:
-            seed += 1
-            for scene in scenes:
-                for flight in range(self.flights):
-                    yield Flight(scene, seed, flight, self.sensors)
+        """The same flights with the next seeds, without end, control scenes excluded."""
+        flights = [flight for flight in self.flights if _has_places(flight)]
+        for step in count(1) if flights else ():
+            yield from (replace(flight, seed=flight.seed + step) for flight in flights)
 
     def tasks(self) -> int:
-        """How many tasks the first flights make."""
-        return len(grouped(unit for flight in self.first_flights() for unit in self.units(flight)))
+        """Number of groups of units on the first flights, each one task of a worker."""
+        return len(grouped(unit for flight in self.flights for unit in self.units(flight)))
 
     def measured(self, recordings: Path | None, store: UnitStore, crew: Crew) -> Finished:
-        """Record and measure what is not there yet, flight after flight until there is enough.
+        """Record and measure what is missing, flight after flight until there are enough sequences.
 
-        Which flights are flown depends on the plan and on what they gave, not on who flew them.
+        The flights flown depend on the plan and on their sequences, not on the workers.
 
         Args:
-            recordings: Folder of the recordings; those in it with the right name are used. None
-                keeps none: images are drawn while they are measured, once more for each pass.
-            store: Has the units that an earlier run finished, and takes those of this one.
-            crew: Does the work.
+            recordings: Folder of the recordings; existing ones with the right name are used.
+                None keeps none: images are drawn while they are measured, once more for each pass.
+            store: Units that an earlier run finished; takes those of this run.
+            crew: Processes that do the work.
         """
         further = self.further_flights()
-        flown = self._flown(self.first_flights(), recordings, store, crew)
-        while (wanting := self.sequences - _sequences([units[0] for units in flown])) > 0:
-            # No flight gives more sequences than this, so that none of them is one too many.
-            flights = list(islice(further, -(-wanting // self.protocol.sequences)))
+        flown = self._flown(self.flights, recordings, store, crew)
+        while (missing := self.sequences - _sequences([units[0] for units in flown])) > 0:
+            # No flight gives more sequences than this, so no flight is flown in vain.
+            flights = list(islice(further, -(-missing // self.protocol.sequences)))
             if not flights:
                 break  # only control scenes
             flown += self._flown(flights, recordings, store, crew)
         return Finished.merged([unit for units in flown for unit in units])
 
     def stranger(self, flight: Flight) -> Flight | None:
-        """Whose ground map is the wrong one for a flight: the same flight over the next scene.
+        """The flight whose ground map is the wrong one: the same flight over the next scene.
 
         None where no other scene holds anything to find.
         """
-        places = [scene for scene in self.scenes if scene.name not in CONTROL_SCENES]
-        here = places.index(flight.scene)
-        others = (scene for scene in places[here:] + places[:here] if scene != flight.scene)
-        other = next(others, None)
-        return None if other is None else replace(flight, scene=other)
+        scenes: list[Scene] = []
+        for other in filter(_has_places, self.flights):
+            scenes += [other.scene] if other.scene not in scenes else []
+        here = scenes.index(flight.scene)
+        others = scenes[here + 1 :] + scenes[:here]
+        return replace(flight, scene=others[0]) if others else None
 
     def units(self, flight: Flight, recordings: Mapping[str, Path] = NOTHING) -> list[Unit]:
-        """What is measured on one flight, that of the primary setup first.
+        """The units of one flight, that of the primary setup first.
 
         Args:
-            flight: Which one.
-            recordings: By the flights' `recording_name`; others are drawn on the fly.
+            flight: The flight.
+            recordings: Recordings by their `recording_name`; images of others are drawn.
         """
 
         def where(of: Flight) -> Path | Flight:
             return recordings.get(recording_name(of), of)
 
-        first_flights = self.first_flights()
-        # Flights that follow bring more sequences, of setups that need no maps of their own.
-        setups = self.setups
-        if flight not in first_flights:
-            setups = [setup for setup in setups if setup.maps_like(setups[0])]
-        units = [
+        # Further flights bring sequences, of setups that share the maps of the primary one.
+        is_first = flight in self.flights
+        setups = [s for s in self.setups if is_first or s.maps_like(self.setups[0])]
+        primary, *others = (
             Unit(where(flight), flight.seed, flight.flight, setup, self.protocol)
             for setup in setups
-        ]
-        negatives = flight in first_flights and flight.scene.name not in CONTROL_SCENES
+        )
+        negatives = self.negatives and is_first and _has_places(flight)
         stranger = self.stranger(flight) if negatives else None
-        units[0] = replace(
-            units[0],
-            showcase=flight == first_flights[0],
+        primary = replace(
+            primary,
+            showcase=flight == self.flights[0],
             budget=self.budget,
             baselines=self.protocol.baselines > 0,
             negatives=negatives,
             stranger=None if stranger is None else where(stranger),
         )
-        return units
+        return [primary, *others]
 
     def _flown(
         self, flights: list[Flight], recordings: Path | None, store: UnitStore, crew: Crew
     ) -> list[list[Finished]]:
-        """The units of each flight, that of the primary setup first."""
+        """The finished units of each flight, that of the primary setup first."""
         made: dict[str, Path] = {}
         if recordings is not None:
             made = {path.name: path for path in recorded(flights, recordings, crew)}
@@ -145,11 +128,23 @@ class Plan:
         return [[next(finished) for _ in of_flight] for of_flight in units]
 
 
+def flights_over(
+    scenes: Sequence[Scene], flights: int, sensors: SensorPreset, seed: int
+) -> list[Flight]:
+    """Some flights over each scene, all with one seed."""
+    return [Flight(scene, seed, number, sensors) for scene in scenes for number in range(flights)]
+
+
+def _has_places(flight: Flight) -> bool:
+    """Whether the scene holds anything to find."""
+    return flight.scene.name not in CONTROL_SCENES
+
+
 def _sequences(finished: Sequence[Finished]) -> int:
-    """How many there are, control scenes apart."""
-    count = 0
+    """Number of sequences, control scenes excluded."""
+    total = 0
     for unit in finished:
         frame = unit.table.rows("localization", "error_m")
         frame = frame[~frame["scene"].isin(CONTROL_SCENES)]
-        count += len(frame[SEQUENCE_KEYS].drop_duplicates())
-    return count
+        total += len(frame[SEQUENCE_KEYS].drop_duplicates())
+    return total

@@ -1,28 +1,23 @@
 """The fast suite: fixed, small, meant to run on every change.
 
-Many short flights over different heaps, not one long one: flights are what is independent.
-Ten of them are the fewest that can say anything with all metrics watched (`verdict`), and
-only if all agree; of twelve, one may move a little the other way.
+It has many short flights over different heaps instead of one long flight, since only flights are
+independent. With all metrics watched (`judge.verdict`), ten flights are the fewest that can give
+a verdict, and only if all agree; with twelve, one may differ a little.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
+from evaluation.measure.plans.reproduce import Plan
 from evaluation.measure.protocol.trials import Protocol
-from evaluation.measure.work.crew import Crew
-from evaluation.measure.work.measure import measure
-from evaluation.measure.work.recordings import recorded
-from evaluation.measure.work.unit import Finished, Unit, UnitStore
 from evaluation.setup.setups import Setup
 from sim.recording.rendered import Flight
 from sim.scene import load_scene
 from sim.sensors.presets import SensorPreset
 
 SEEDS_APART = 100
-"""Seed n of the suite draws heaps n * 100, n * 100 + 1, ...: other seeds, other heaps."""
+"""Seed n of the suite draws heaps n * 100, n * 100 + 1, ...: other seeds give other heaps."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +25,9 @@ class Flights:
     """Some flights over one scene, each over a heap of its own.
 
     Attributes:
-        scene: Its name.
-        count: How many.
-        duration_s: Of each recording; the scene's flight is cut there.
+        scene: Name of the scene.
+        count: Number of flights.
+        duration_s: Duration of each recording, where the flight is cut [s].
     """
 
     scene: str
@@ -42,78 +37,38 @@ class Flights:
 
 @dataclass(frozen=True)
 class Suite:
-    """What is flown, and what is measured on each flight."""
+    """Flights, and the extent of the measurements on each."""
 
     flights: tuple[Flights, ...]
     protocol: Protocol
 
+    def plan(self, setup: Setup, sensors: SensorPreset, seed: int) -> Plan:
+        """The plan that measures one setup.
+
+        Args:
+            setup: The setup.
+            sensors: Quality of the sensors.
+            seed: Seed of the heaps, the flights, the noise and the particles.
+        """
+        flights = [
+            Flight(
+                load_scene(flights.scene),
+                SEEDS_APART * seed + index,
+                0,
+                sensors,
+                flights.duration_s,
+            )
+            for flights in self.flights
+            for index in range(flights.count)
+        ]
+        return Plan(flights, [setup], self.protocol, negatives=False)
+
 
 SUITES = {
     "fast": Suite(
-        # `flat` holds nothing to find: whoever claims a place there is wrong.
+        # `flat` holds nothing to find: every claimed position there is wrong.
         (Flights("tiny", 12, 20.0), Flights("flat", 1, 24.0)),
         # Verdicts look at aerial maps 1 and 4.
         Protocol(sequences=3, trials=4, sequence_length=4, wide_searches=6),
     ),
 }
-
-
-@dataclass(frozen=True)
-class SuitePlan:
-    """A suite to be flown.
-
-    Attributes:
-        suite: What to fly.
-        setup: What to measure.
-        sensors: How good the sensors are.
-        seed: Of the heaps, the flights, the noise and the particles.
-    """
-
-    suite: Suite
-    setup: Setup
-    sensors: SensorPreset
-    seed: int
-
-    def flights(self) -> list[Flight]:
-        """All flights in their order, each over a heap of its own."""
-        return [
-            Flight(
-                load_scene(flights.scene),
-                SEEDS_APART * self.seed + index,
-                0,
-                self.sensors,
-                flights.duration_s,
-            )
-            for flights in self.suite.flights
-            for index in range(flights.count)
-        ]
-
-    def tasks(self) -> int:
-        """How many tasks they make."""
-        return sum(flights.count for flights in self.suite.flights)
-
-    def measured(self, recordings: Path | None, store: UnitStore, crew: Crew) -> Finished:
-        """Record what is not there yet, and measure one setup.
-
-        Args:
-            recordings: Folder of the recordings; those in it with the right name are used. None
-                keeps none.
-            store: Has the units that an earlier run finished, and takes those of this one.
-            crew: Does the work; the result does not depend on it.
-        """
-        flights = self.flights()
-        made: Sequence[Path | Flight] = flights
-        if recordings is not None:
-            made = recorded(flights, recordings, crew)
-        units = [
-            Unit(
-                recording,
-                flight.seed,
-                flight.flight,
-                self.setup,
-                self.suite.protocol,
-                showcase=flight is flights[0],
-            )
-            for flight, recording in zip(flights, made, strict=True)
-        ]
-        return Finished.merged(measure(units, store, crew))

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from airground.config import Config
 from evaluation.commands.reproduce import Reproduce
 from evaluation.measure.plans import reproduce as module
-from evaluation.measure.plans.reproduce import Plan
+from evaluation.measure.plans.reproduce import Plan, flights_over
 from evaluation.measure.protocol.trials import Protocol
 from evaluation.measure.work.crew import Crew
 from evaluation.measure.work.recordings import recording_name
@@ -54,12 +54,9 @@ def flown_for(
         return finished
 
     plan = Plan(
-        [load_scene(scene) for scene in scenes],
-        flights,
+        flights_over([load_scene(scene) for scene in scenes], flights, NOMINAL, seed=5),
         with_companions(Setup(Config()))[:setups],
-        NOMINAL,
         Protocol(A_FLIGHT),
-        seed=5,
         sequences=wanted,
     )
     with pytest.MonkeyPatch.context() as patch:
@@ -98,8 +95,10 @@ def test_nothing_can_be_counted_over_control_scenes_alone() -> None:
 
 def test_flights_that_follow_measure_what_shares_the_primary_setups_maps() -> None:
     setups = with_companions(Setup(Config()))
-    plan = Plan([load_scene("tiny")], 1, setups, NOMINAL, Protocol(), 5, sequences=100)
-    assert [unit.setup for unit in plan.units(plan.first_flights()[0])] == setups
+    plan = Plan(
+        flights_over([load_scene("tiny")], 1, NOMINAL, 5), setups, Protocol(), sequences=100
+    )
+    assert [unit.setup for unit in plan.units(plan.flights[0])] == setups
     measured = [unit.setup for unit in plan.units(next(plan.further_flights()))]
     assert [setup.config.localization.heading for setup in measured] == ["known", "search"]
     assert measured[0] == setups[0]
@@ -108,13 +107,14 @@ def test_flights_that_follow_measure_what_shares_the_primary_setups_maps() -> No
 
 def plan_of(*scenes: str, flights: int = 2) -> Plan:
     setups = with_companions(Setup(Config()))[:2]
-    return Plan([load_scene(name) for name in scenes], flights, setups, NOMINAL, Protocol(), 5)
+    flown = flights_over([load_scene(name) for name in scenes], flights, NOMINAL, 5)
+    return Plan(flown, setups, Protocol())
 
 
 def test_the_wrong_map_is_that_of_the_same_flight_over_the_next_scene() -> None:
     plan = plan_of("indoor_a", "flat", "indoor_b", "tiny")
     strangers = {}
-    for flight in plan.first_flights():
+    for flight in plan.flights:
         if flight.scene.name != "flat":
             stranger = plan.stranger(flight)
             assert stranger is not None
@@ -122,12 +122,12 @@ def test_the_wrong_map_is_that_of_the_same_flight_over_the_next_scene() -> None:
             strangers[flight.scene.name] = stranger.scene.name
     assert strangers == {"indoor_a": "indoor_b", "indoor_b": "tiny", "tiny": "indoor_a"}
     alone = plan_of("tiny", "flat")
-    assert alone.stranger(alone.first_flights()[0]) is None
+    assert alone.stranger(alone.flights[0]) is None
 
 
 def test_negatives_are_tried_on_the_primary_setup_of_flights_with_something_to_find() -> None:
     plan = plan_of("tiny", "indoor_a", "flat", flights=1)
-    tiny, indoor, flat = plan.first_flights()
+    tiny, indoor, flat = plan.flights
     recordings = {recording_name(indoor): Path("there")}
     primary, companion = plan.units(tiny, recordings)
     assert (primary.recording, primary.negatives, primary.stranger) == (tiny, True, Path("there"))

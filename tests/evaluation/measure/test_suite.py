@@ -10,8 +10,9 @@ import pytest
 from airground.config import Config
 from evaluation.judge.metrics import WATCHED
 from evaluation.judge.verdict import ALPHA
-from evaluation.measure.plans import suite
-from evaluation.measure.plans.suite import SUITES, Flights, Suite, SuitePlan
+from evaluation.measure.plans import reproduce
+from evaluation.measure.plans.reproduce import Plan
+from evaluation.measure.plans.suite import SUITES, Flights, Suite
 from evaluation.measure.protocol.trials import Protocol
 from evaluation.measure.work.crew import Crew
 from evaluation.measure.work.out_folder import resumable_folder
@@ -24,8 +25,8 @@ from sim.sensors.presets import NOMINAL, NONE
 from tests.evaluation.judge.flights import CONDITION
 
 
-def plan(seed: int) -> SuitePlan:
-    return SuitePlan(SUITES["fast"], Setup(Config()), NOMINAL, seed)
+def plan(seed: int) -> Plan:
+    return SUITES["fast"].plan(Setup(Config()), NOMINAL, seed)
 
 
 @pytest.fixture
@@ -38,12 +39,12 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Unit]:
         rows = [Row("tiny", u.seed, 0, CONDITION, "run", "recorded_s", 20.0, "s") for u in units]
         return [Finished(ResultTable.from_rows([row]), None) for row in rows]
 
-    monkeypatch.setattr(suite, "measure", measure)
+    monkeypatch.setattr(reproduce, "measure", measure)
     return seen
 
 
 def test_every_flight_has_a_heap_and_a_recording_of_its_own() -> None:
-    flights = [flight for seed in (0, 1) for flight in plan(seed).flights()]
+    flights = [flight for seed in (0, 1) for flight in plan(seed).flights]
     assert len({(flight.scene.name, flight.seed) for flight in flights}) == len(flights)
     assert len({recording_name(flight) for flight in flights}) == len(flights)
     assert len(flights) == 2 * plan(0).tasks()
@@ -52,7 +53,7 @@ def test_every_flight_has_a_heap_and_a_recording_of_its_own() -> None:
 def test_rows_keep_the_order_of_the_flights(asked: list[Unit], tmp_path: Path) -> None:
     crew = Crew(None, 1, 1, tmp_path)
     found = plan(3).measured(None, UnitStore(tmp_path / "units"), crew)
-    assert found.table.frame["seed"].tolist() == [flight.seed for flight in plan(3).flights()]
+    assert found.table.frame["seed"].tolist() == [flight.seed for flight in plan(3).flights]
     assert [unit.showcase for unit in asked] == [True] + [False] * (len(asked) - 1)
 
 
@@ -67,8 +68,8 @@ def test_a_suite_can_say_something_and_has_a_control(name: str) -> None:
 @pytest.mark.slow
 def test_a_flight_is_recorded_once_and_measured_alike(tmp_path: Path) -> None:
     one = Suite((Flights("tiny", 1, 16.0),), Protocol(sequences=1, trials=2, sequence_length=4))
-    flown = SuitePlan(one, Setup(Config(), "oracle"), NONE, 0)
-    header = tmp_path / "recordings" / recording_name(flown.flights()[0]) / "recording.toml"
+    flown = one.plan(Setup(Config(), "oracle"), NONE, 0)
+    header = tmp_path / "recordings" / recording_name(flown.flights[0]) / "recording.toml"
     values, times = [], []
     for out in ("first", "again"):
         with (
