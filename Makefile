@@ -30,6 +30,7 @@ check: $(READY)
 # The pages of docs/ with the API reference, to read in a browser: results/docs/index.html.
 docs: $(READY)
 	$(PYTHON_IN_VENV) docs/parameters.py
+	$(PYTHON_IN_VENV) docs/metrics.py
 	.venv/bin/sphinx-build -W --keep-going -q -b html docs results/docs
 
 # Did a change make it worse? Against evaluation/accepted.json; docs/check_a_change.md.

@@ -184,6 +184,12 @@ def test_the_table_of_parameters_is_up_to_date() -> None:
     assert page == made, "config.py has changed: run docs/parameters.py, or make docs"
 
 
+def test_the_page_of_metrics_is_that_of_the_table() -> None:
+    made = runpy.run_path(str(ROOT / "docs" / "metrics.py"))["page"]()
+    page = (ROOT / "docs" / "metrics.md").read_text(encoding="utf-8")
+    assert page == made, "the table of metrics has changed: run docs/metrics.py, or make docs"
+
+
 def test_every_parameter_is_explained() -> None:
     bare = [
         f"{section}.{name}"

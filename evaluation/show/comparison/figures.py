@@ -29,7 +29,7 @@ _UNITS = {
 
 
 def comparison_figures(helds: Sequence[Against]) -> Iterator[ReportFigure]:
-    """Draw what there is data for."""
+    """Draw the figures for which there is data."""
     yield from _differences(helds)
     runs = [helds[0].reference, *(held.run for held in helds)]
     drawn = [
@@ -58,7 +58,7 @@ def _differences(helds: Sequence[Against]) -> Iterator[ReportFigure]:
         f"Each run minus {helds[0].reference.name}. A dot is a flight (the median of its "
         "differences, for shares their mean), or a single value where there are too few flights; "
         "the bar is the effect with its 95 % interval. On the shaded side a run is worse. Crosses "
-        "count what failed anew (above) and what no longer fails (below). Metrics without any "
+        "count new failures (above) and failures that disappeared (below). Metrics without any "
         "difference are left out.",
         paired_differences_figure(
             panels,
@@ -119,9 +119,9 @@ def _times(runs: Sequence[Run]) -> Iterator[ReportFigure]:
         return
     machines = {(run.summary.machine.cpu, run.summary.machine.cores) for run in runs}
     caveat = (
-        "The machines differ, so that these ratios say nothing about the code."
+        "The machines differ, so these ratios say nothing about the code."
         if len(machines) > 1
-        else "All runs name the same kind of machine; what else it did meanwhile nobody knows."
+        else "All runs name the same kind of machine; its load at the time is unknown."
     )
     yield ReportFigure(
         "times",

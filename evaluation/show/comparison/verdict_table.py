@@ -1,4 +1,4 @@
-"""A comparison in words: the same cells for the screen, for Markdown and for JUnit."""
+"""A comparison as text: the same cells for the screen, for Markdown and for JUnit."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def cells(judged: Judged) -> tuple[str, ...]:
 
 
 def conclusion(comparison: Comparison) -> str:
-    """One sentence that says what came out."""
+    """The outcome in one sentence."""
     parts = []
     for verdict in MOVED:
         titles = [judged.metric.title for judged in comparison.of(verdict)]
@@ -55,16 +55,16 @@ def conclusion(comparison: Comparison) -> str:
 
 
 def conditions(comparison: Comparison) -> str:
-    """What was compared with what, and how it was judged."""
+    """What was compared, and how it was judged."""
     pairs = "the same flights, trial by trial" if comparison.paired else "other flights"
     text = (
         f"{comparison.suite}; {comparison.condition.label()}; {pairs}. p is adjusted for all "
-        f"metrics (Holm); better or worse: p at most {ALPHA:g}; slightly: by less than matters."
+        f"metrics (Holm). Better or worse: p is at most {ALPHA:g}. Slightly: less than matters."
     )
     if any(_taken_as_independent(judged) for judged in comparison.judged):
         text += (
-            " * Too few flights to be the observations: single values are, taken as "
-            "independent, so trust a narrow verdict less."
+            " * Too few flights: single values are the observations. They are not quite "
+            "independent, so a narrow verdict is less certain."
         )
     return text
 
@@ -88,7 +88,7 @@ def print_comparison(comparison: Comparison, console: Console | None = None) -> 
 
 
 def markdown(comparison: Comparison) -> str:
-    """The table for a pull request: what moved is on top, the rest folds away."""
+    """The table for a pull request: changes first, the rest folded."""
     moved = [judged for verdict in MOVED for judged in comparison.of(verdict)]
     rest = [judged for judged in comparison.judged if judged not in moved]
     lines = [f"**airground check: {_escaped(conclusion(comparison))}**", ""]
@@ -118,7 +118,9 @@ def _escaped(text: str) -> str:
 
 def _taken_as_independent(judged: Judged) -> bool:
     compared = judged.compared
-    return compared is not None and not compared.by_flight and judged.metric.each != "recording"
+    if compared is None or judged.verdict == Verdict.SINGLE:
+        return False
+    return not compared.by_flight and judged.metric.each != "recording"
 
 
 def _observations(judged: Judged) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from evaluation.judge.metrics import METRICS
 from evaluation.measure.showcase import Showcase
 from evaluation.setup import published
 from evaluation.setup.condition import Condition, shared_parts, short_labels
@@ -24,10 +25,16 @@ from evaluation.show.gallery.figures import ReportFigure, showcase_figures
 from evaluation.show.report.calibration import calibration_figures
 from evaluation.show.report.error_budget import budget_figure
 from evaluation.show.report.trajectories import trajectory_figures
+from evaluation.table.limits import LOCATED_M, NEAR_M
 from evaluation.table.rows import ResultTable
 
+PAPER = (
+    f"{METRICS['within_50cm_1'].paper} {METRICS['within_50cm_1'].title}, "
+    f"{METRICS['within_25cm_4'].paper} {METRICS['within_25cm_4'].title}, "
+    f"{published.SEQUENCES.value:g} sequences"
+)
 COMPARED = len(SERIES)
-"""Conditions drawn side by side; more would not be told apart."""
+"""Conditions drawn side by side; more would have no colour of their own."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +50,7 @@ class Drawn:
 def report_figures(
     table: ResultTable, conditions: Sequence[Condition], showcase: Showcase | None
 ) -> Iterator[ReportFigure]:
-    """Draw what there is data for, in the paper's order."""
+    """Draw the figures for which there is data, in the paper's order."""
     if showcase is not None:
         yield from showcase_figures(showcase)
     drawn = _chosen(table, conditions)
@@ -81,9 +88,9 @@ def localization_figures(drawn: list[Drawn]) -> Iterator[ReportFigure]:
         "Horizontal distance between the estimated and the true position of the MAV relative to "
         "the ground robot, no alignment applied. Boxes: median and quartiles; whiskers to 1.5 "
         "interquartile ranges; every outlier is drawn; a number with a cross above the axis "
-        "counts sequences without any estimate. Below: share of sequences within 0.5 and "
-        "0.25 m with 95 % Wilson intervals; failures stay in. Red: the paper (65 % within 0.5 m "
-        f"at iteration 1, 89 % within 0.25 m after 4, 41 sequences, real robots). {counts}",
+        f"counts sequences without any estimate. Below: share of sequences within {NEAR_M:g} and "
+        f"{LOCATED_M:g} m with 95 % Wilson intervals; failures count. Red: the paper ({PAPER}, "
+        f"real robots). {counts}",
         localization_error_figure(_per_sequence(shown, "error_m"), colours),
     )
     yield ReportFigure(
@@ -105,12 +112,12 @@ def refinement_figures(drawn: list[Drawn]) -> Iterator[ReportFigure]:
     if not shown:
         return
     counts = _counts(shown, [len(d.table.trials()) for d in shown], "trials")
-    start = f"{_start(shown)} The figure under each box is its median; refused alignments stay in. "
+    start = f"{_start(shown)} The number under each box is its median; refused alignments count. "
     for name, title, metric, draw, paper in (
         ("fig13_refinement_translation", "Fig. 13: translation", "translation_m",
-         refinement_translation_figure, "0.076 m"),
+         refinement_translation_figure, METRICS["refined_translation"].paper),
         ("fig14_refinement_angle", "Fig. 14: angle", "rotation_deg",
-         refinement_angle_figure, "3.0 deg"),
+         refinement_angle_figure, METRICS["refined_rotation"].paper),
     ):  # fmt: skip
         pairs = {}
         for d in shown:
@@ -160,14 +167,14 @@ def _timing(primary: Drawn) -> Iterator[ReportFigure]:
         yield ReportFigure(
             "table1_timing",
             "Table I: what each stage takes",
-            f"Measured during the run itself, so beside other work on the same cores; "
+            f"Measured during the run, beside other work on the same cores; "
             f"{primary.condition.label()}. Paper: {published.PLATFORM}.",
             timing_figure(durations),
         )
 
 
 def _counts(drawn: list[Drawn], counts: list[int], what: str) -> str:
-    """How many there are under which conditions."""
+    """Number of cases under each condition."""
     if len(set(counts)) == 1:
         each = " each" if len(counts) > 1 else ""
         return f"Here: {counts[0]} {what}{each}; {_shared([d.condition for d in drawn])}."

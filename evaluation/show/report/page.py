@@ -28,6 +28,7 @@ from evaluation.show.report.figures import report_figures
 from evaluation.show.report.screen import live_table
 from evaluation.show.report.tables import comparison_table, headlines, scene_table, timing_table
 from evaluation.show.report.trajectories import trajectory_table
+from evaluation.table.limits import FOURTH_MAP, GOOD_POSE, LOCATED_M
 from evaluation.table.rows import ResultTable
 
 
@@ -62,7 +63,7 @@ def write_report(
         conditions: What to show, the primary one first; None shows all of the table. The
             primary one, those of the other preset and then the rest are drawn side by side
             (four at most); all stand in the comparison.
-        notes: Sentences for "What to know": what missed its mark and why.
+        notes: Sentences that the page lists at its end.
     """
     shown = list(conditions) if conditions is not None else table.conditions()
     primary = table.of(shown[0])
@@ -83,7 +84,7 @@ def write_report(
         calibration=calibration_table(measured),
         timing=timing_table(measured),
         live=live_table(measured),
-        by_scene=scene_table(primary),
+        by_scene=scene_table(measured),
         controls=control_table(table, shown),
         failures=failures(measured),
         notes=list(notes),
@@ -133,5 +134,8 @@ def rendered(template: str, **words: object) -> str:
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
+    )
+    environment.globals.update(
+        located=f"{LOCATED_M:g} m", judged_after=FOURTH_MAP, good_pose=GOOD_POSE
     )
     return environment.get_template(template).render(**words)

@@ -88,7 +88,7 @@ def test_control_scenes_alone_have_no_place_to_be_found() -> None:
     assert claims["all"].wrong.share == 1.0
 
 
-def test_nothing_asked_is_nothing_told() -> None:
+def test_without_any_case_there_are_no_claims() -> None:
     nothing = ResultTable.from_rows([])
     assert localization_claims(nothing) == refinement_claims(nothing) == {}
     assert claims_table(nothing).rows == ()
@@ -105,7 +105,7 @@ def test_the_table_has_a_row_for_each_case() -> None:
     assert rows["all together"][5].startswith("66.7 %\n2 of 3;")
 
 
-def test_the_summary_tells_the_same() -> None:
+def test_the_summary_has_the_same_counts() -> None:
     table = make_table(conditions=(BEST,))
     made = claims_summary(table.of(BEST))
     false = made.localization["wrong_map"].wrong

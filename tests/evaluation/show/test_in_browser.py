@@ -84,7 +84,7 @@ def test_the_report_fits_the_window(report: Path, opened: Browser, size: str) ->
         "Scene by scene",
         "Where there is nothing to find",
         "Failures",
-        "What to know",
+        "Notes",
     ]
     check(opened, size)
 
@@ -96,7 +96,7 @@ def test_the_comparison_fits_the_window(comparison: Path, opened: Browser, size:
         f"{LONG} against before",
         "other seeds against before",
         "Figures",
-        "Failures that came and went",
+        "Failures that appeared or disappeared",
         "Conditions",
     ]
     check(opened, size)

@@ -38,3 +38,26 @@ def test_noise_comes_back_as_its_size() -> None:
         for t in STAMPS
     ]
     assert trajectory_error(noisy, true_pose).se3_rmse_m == pytest.approx(0.01 * 3**0.5, rel=0.1)
+
+
+def test_the_relative_error_is_the_drift_per_metre() -> None:
+    """A path along x whose estimate is 2 % too long, seen from another map frame."""
+    straight = {
+        t: SE3(np.eye(3), [0.5 * t * 1e-9, 0.0, 0.02 * (i % 2)]) for i, t in enumerate(STAMPS)
+    }
+    T_map_world = SE3.exp(np.array([1.0, -2.0, 0.5, 0.1, 0.2, 2.0]))
+    exact = [(t, T_map_world @ pose) for t, pose in straight.items()]
+    assert trajectory_error(exact, straight.__getitem__).rpe_1m_rmse_m < 1e-9
+    stretch = np.array([1.02, 1.0, 1.0])
+    long = [
+        (t, T_map_world @ SE3(p.rotation, stretch * p.translation)) for t, p in straight.items()
+    ]
+    error = trajectory_error(long, straight.__getitem__)
+    assert error.rpe_1m_rmse_m == pytest.approx(0.02, rel=0.15)
+
+
+def test_a_path_shorter_than_a_metre_has_no_relative_error() -> None:
+    short = {t: SE3(np.eye(3), [0.002 * i, 0.001 * (i % 3), 0.0]) for i, t in enumerate(STAMPS)}
+    error = trajectory_error(list(short.items()), short.__getitem__)
+    assert np.isnan(error.rpe_1m_rmse_m)
+    assert error.se3_rmse_m < 1e-9
