@@ -50,7 +50,7 @@ class Gallery(Verb, OutWord):
                 self._animate(folder, results.showcase)
 
     def _animate(self, folder: Path, showcase: Showcase) -> None:
-        from evaluation.show.gallery.landing import save_landing
+        from evaluation.show.figures.landing import save_landing
 
         if showcase.T_ground_mav is None:
             raise InputError(f"{self.run}: --animation: its surface was not aligned")

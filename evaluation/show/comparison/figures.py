@@ -10,11 +10,10 @@ from evaluation.judge.metrics import WATCHED, Metric
 from evaluation.judge.runs import Against, Run
 from evaluation.judge.verdict import paired_differences
 from evaluation.setup.published import TABLE_I
-from evaluation.show.figures.depth_maps import surface_figure
+from evaluation.show.figures.fig06_depth_maps import surface_figure
 from evaluation.show.figures.paired_differences import Differences, Panel, paired_differences_figure
-from evaluation.show.figures.style import SERIES
-from evaluation.show.figures.timing import time_ratio_figure
-from evaluation.show.gallery.figures import ReportFigure
+from evaluation.show.figures.style import SERIES, ReportFigure
+from evaluation.show.figures.table1_timing import time_ratio_figure
 from evaluation.show.report.figures import Drawn, localization_figures, refinement_figures
 from evaluation.table.rows import ResultTable
 

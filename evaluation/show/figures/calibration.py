@@ -1,16 +1,25 @@
-"""Whether the particles' spread tells the error: ellipses that hold it, and dot by dot."""
+"""Calibration of the particles: coverage of their ellipses, and their spread against the error."""
 
 from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
 
 from evaluation.judge.claims import ELLIPSES, Localizations
-from evaluation.show.figures.style import FAINT, INK, SERIES, SMALL_PT, WIDE_IN, styled
+from evaluation.show.figures.style import (
+    DASHED,
+    FAINT,
+    INK,
+    SERIES,
+    SMALL_PT,
+    WIDE_IN,
+    plain_numbers,
+    styled,
+)
 
 NOMINAL = np.linspace(0.01, 0.99, 99)
+"""Shares of a Gaussian at which coverage is computed."""
 
 
 @styled
@@ -28,8 +37,6 @@ def calibration_figure(found: Localizations) -> Figure:
 
 
 def _coverage(axes: Axes, found: Localizations) -> None:
-    axes.plot([0, 100], [0, 100], color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
-    axes.text(32, 35, "as it should be", rotation=45, rotation_mode="anchor", fontsize=SMALL_PT)
     groups = (("all", found, FAINT), ("accepted", found.only_accepted(), SERIES[0]))
     for shift, (name, part, colour) in enumerate(groups):
         if len(part) == 0:
@@ -42,13 +49,11 @@ def _coverage(axes: Axes, found: Localizations) -> None:
             x = 100 * share + (shift - 0.5) * 1.4
             axes.vlines(x, 100 * rate.low, 100 * rate.high, color=colour, linewidth=1.6)
             axes.plot(x, 100 * rate.share, "o", color=colour, markersize=4.5)
-    axes.set_xlim(0, 101.5)
-    axes.set_ylim(0, 101.5)
-    axes.set_xlabel("share of a Gaussian that the ellipse holds [%]")
-    axes.set_ylabel("true positions in it [%]")
+    axes.text(32, 35, "ideal", rotation=45, rotation_mode="anchor", fontsize=SMALL_PT)
+    axes.set_xlabel("share of a Gaussian inside the ellipse [%]")
+    axes.set_ylabel("true positions inside the ellipse [%]")
     axes.set_title("coverage of the particles' ellipses")
-    axes.grid()
-    axes.legend(loc="best")
+    _square(axes, 0, 100, 101.5)
 
 
 def _spread_against_error(axes: Axes, found: Localizations) -> None:
@@ -57,28 +62,25 @@ def _spread_against_error(axes: Axes, found: Localizations) -> None:
         (found.accepted, "accepted", SERIES[0]),
     ):
         axes.plot(
-            found.spread_m[chosen],
-            found.error_m[chosen],
-            "o",
-            color=colour,
-            alpha=0.55,
-            markersize=3.2,
-            markeredgewidth=0,
-            label=f"{name} ({int(chosen.sum())})",
+            found.spread_m[chosen], found.error_m[chosen], "o", color=colour, alpha=0.55,
+            markersize=3.2, markeredgewidth=0, label=f"{name} ({int(chosen.sum())})",
             rasterized=True,
-        )
+        )  # fmt: skip
     axes.set_xscale("log")
     axes.set_yscale("log")
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        axis.set_minor_formatter(NullFormatter())
-    low, high = _limits(found)
-    axes.plot([low, high], [low, high], color=INK, linewidth=1.0, linestyle=(0, (5, 3)))
-    axes.set_xlim(low, high)
-    axes.set_ylim(low, high)
+    plain_numbers(axes.xaxis)
+    plain_numbers(axes.yaxis)
     axes.set_xlabel("spread of the particles [m]")
     axes.set_ylabel("horizontal error [m]")
-    axes.set_title("one dot an aerial map; dashed: equal")
+    axes.set_title("one dot per aerial map; dashed: equal")
+    low, high = _limits(found)
+    _square(axes, low, high, high)
+
+
+def _square(axes: Axes, low: float, high: float, end: float) -> None:
+    """The same range on both axes, with the diagonal."""
+    axes.plot([low, high], [low, high], color=INK, linewidth=1.0, linestyle=DASHED, zorder=1.9)
+    axes.set(xlim=(low, end), ylim=(low, end))
     axes.grid()
     axes.legend(loc="best")
 

@@ -1,4 +1,4 @@
-"""Several front ends on one robot's recording, their errors over time in one figure.
+"""Position errors over time of several front ends on one robot's recording.
 
 python -m evaluation.show.figures.front_ends RECORDING ground slam open3d opencv --out FILE.png
 """
@@ -6,7 +6,7 @@ python -m evaluation.show.figures.front_ends RECORDING ground slam open3d opencv
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 
 from airground.config import Config
 from airground.core.cloud import Source
-from airground.core.se3 import SE3
-from airground.core.trajectory import Trajectory
 from airground.errors import InputError
 from airground.io.open_recording import open_robot
 from airground.io.robot_recording import RobotRecording
@@ -36,9 +34,9 @@ class FrontEndError:
     """One front end on the recording.
 
     Attributes:
-        name: As on the command line.
-        time_s: (N,) of its poses since the first image [s].
-        error_m: (N,) of their positions after SE3 alignment [m].
+        name: Name on the command line.
+        time_s: (N,) times of its poses since the first image [s].
+        error_m: (N,) position errors after SE3 alignment [m].
         tracked: Share of the images with a pose (`tracked_share`).
     """
 
@@ -47,15 +45,18 @@ class FrontEndError:
     error_m: NDArray[np.float64]
     tracked: float
 
+    @property
+    def rms_cm(self) -> float:
+        return 100 * float(np.sqrt(np.mean(self.error_m**2)))
+
 
 @styled
 def front_ends_figure(title: str, errors: Sequence[FrontEndError]) -> Figure:
-    """One curve a front end, with its RMS error and how many images it tracked."""
+    """One curve per front end, with its RMS error and its share of tracked images."""
     figure = Figure(figsize=(WIDE_IN, 3.2), layout="constrained")
     axes = figure.subplots()
     for colour, one in zip(SERIES, errors, strict=False):
-        rms = float(np.sqrt(np.mean(one.error_m**2)))
-        label = f"{one.name}: {100 * rms:.1f} cm RMS, {one.tracked:.0%} tracked"
+        label = f"{one.name}: {one.rms_cm:.1f} cm RMS, {one.tracked:.0%} tracked"
         axes.plot(one.time_s, 100 * one.error_m, color=colour, linewidth=1.5, label=label)
     axes.set_title(title)
     axes.set_xlabel("time [s]")
@@ -82,32 +83,21 @@ def front_end_error(recording: RobotRecording, name: str, config: Config) -> Fro
     else:
         front_end = front_ends.make_front_end(front_ends.GROUND, name, given)
     result = run_alone(recording, front_end)
-    poses = _known(result.live, true_pose)
-    if len(poses) < 3:
-        raise InputError(f"{name}: gave {len(poses)} poses with known truth, at least 3 needed")
-    truth = {stamp: true for stamp, _, true in poses}
-    errors = aligned_errors([(stamp, pose) for stamp, pose, _ in poses], truth.__getitem__)
+    live = result.live
+    stamps = [] if live is None else live.stamps_ns.tolist()
+    poses = [(stamp, live[i]) for i, stamp in enumerate(stamps) if live is not None]
+    truth = {stamp: true for stamp, _ in poses if (true := true_pose(stamp)) is not None}
+    if len(truth) < 3:
+        raise InputError(f"{name}: gave {len(truth)} poses with known truth, at least 3 needed")
+    known = [(stamp, pose) for stamp, pose in poses if stamp in truth]
+    errors = aligned_errors(known, truth.__getitem__)
     time_s = (np.array(list(truth)) - recording.camera_stamps[0]) * 1e-9
     share = tracked_share_of(recording, result.tracked, true_pose)
     return FrontEndError(name, time_s, errors, share.fraction)
 
 
-def _known(
-    path: Trajectory | None, true_pose: Callable[[int], SE3 | None]
-) -> list[tuple[int, SE3, SE3]]:
-    """Stamp, pose and truth wherever the truth is known."""
-    known = []
-    for index in range(0 if path is None else len(path)):
-        assert path is not None
-        stamp = int(path.stamps_ns[index])
-        true = true_pose(stamp)
-        if true is not None:
-            known.append((stamp, path[index], true))
-    return known
-
-
 def main(words: Sequence[str] | None = None) -> None:
-    """Draw what the words ask for, and print a line for each front end."""
+    """Draw the errors of the given front ends, and print a line for each."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("recording", type=Path)
     parser.add_argument("robot", choices=["mav", "ground"])
@@ -119,8 +109,7 @@ def main(words: Sequence[str] | None = None) -> None:
     title = f"{given.recording.resolve().name}, {given.robot}, live poses"
     front_ends_figure(title, errors).savefig(given.out, dpi=PICTURE_DPI)
     for one in errors:
-        rms = 100 * float(np.sqrt(np.mean(one.error_m**2)))
-        print(f"{one.name:10} {rms:6.2f} cm RMS after SE3   {one.tracked:6.1%} tracked")
+        print(f"{one.name:10} {one.rms_cm:6.2f} cm RMS after SE3   {one.tracked:6.1%} tracked")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Paired differences, metric by metric: every flight a dot, the effect a bar with interval."""
+"""Paired differences by metric: a dot per flight, and the effect as a bar with its interval."""
 
 from __future__ import annotations
 
@@ -10,18 +10,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from evaluation.show.figures.style import INK, PAPER, WIDE_IN, styled
+from evaluation.show.figures.style import INK, LABEL_PT, PAPER, WIDE_IN, styled
 
 COLUMNS = 3
 
 
 @dataclass(frozen=True)
 class Differences:
-    """What one run changed in one metric; infinite where it failed anew, or no longer.
+    """Change of one metric in one run; +inf for a new failure, -inf for a failure less.
 
     Attributes:
         each: (N,) after minus before.
-        effect, low, high: What is told of them, with its interval.
+        effect: The effect that is reported.
+        low, high: Its 95 % interval.
     """
 
     each: NDArray[np.float64]
@@ -43,11 +44,12 @@ class Panel:
 def paired_differences_figure(
     panels: Sequence[Panel], labels: Sequence[str], colours: Sequence[str]
 ) -> Figure:
-    """One panel a metric, one column of dots a run; shaded is the side that is worse.
+    """One panel per metric, one column of dots per run; the side that is worse is shaded.
 
     Args:
-        panels: At least one.
-        labels, colours: One a run, in the order of every panel's.
+        panels: At least one metric.
+        labels: Name of each run, in the order of every panel's.
+        colours: Colour of each run.
     """
     rows = -(-len(panels) // COLUMNS)
     figure = Figure(figsize=(WIDE_IN, 1.7 * rows + 0.25), layout="constrained")
@@ -69,36 +71,29 @@ def _draw(axes: Axes, panel: Panel, colours: Sequence[str]) -> None:
     axes.axhspan(*worse, color=PAPER, alpha=0.06, linewidth=0)
     axes.axhline(0, color=INK, linewidth=0.9)
     for column, (one, colour) in enumerate(zip(panel.runs, colours, strict=True)):
-        finite = one.each[np.isfinite(one.each)]
+        finite = np.sort(one.each[np.isfinite(one.each)])
         # Side by side in the order of their size, so that none hides another.
-        places = (
-            column + np.linspace(-0.3, 0.08, len(finite))
-            if len(finite) > 1
-            else [column] * len(finite)
-        )
-        axes.plot(places, np.sort(finite), "o", color=colour, alpha=0.6, markersize=3.5,
-                  markeredgewidth=0)  # fmt: skip
+        x = column + np.linspace(-0.3, 0.08, len(finite)) if len(finite) > 1 else [column]
+        axes.plot(x, finite, "o", color=colour, alpha=0.6, markersize=3.5, markeredgewidth=0)
         bar = column + 0.25
-        low, high = np.clip([one.low, one.high], bottom, top)
-        axes.vlines(bar, low, high, color=colour, linewidth=1.6)
+        axes.vlines(bar, *np.clip([one.low, one.high], bottom, top), color=colour, linewidth=1.6)
         if np.isfinite(one.effect):
             axes.hlines(one.effect, bar - 0.1, bar + 0.1, color=colour, linewidth=2.8)
-        for count, y, align in (
-            (int(np.sum(one.each == np.inf)), 1.0, "top"),
-            (int(np.sum(one.each == -np.inf)), 0.0, "bottom"),
-        ):
-            if count:
-                axes.text(column, y, f"{count}✕", transform=axes.get_xaxis_transform(),
-                          ha="center", va=align, color=colour, fontsize=7.5)  # fmt: skip
+        for failures, y, align in ((np.inf, 1.0, "top"), (-np.inf, 0.0, "bottom")):
+            if count := int(np.sum(one.each == failures)):
+                axes.text(
+                    column, y, f"{count}✕", transform=axes.get_xaxis_transform(), ha="center",
+                    va=align, color=colour, fontsize=LABEL_PT,
+                )  # fmt: skip
     axes.set_xlim(-0.6, len(panel.runs) - 0.4)
     axes.set_xticks([])
     axes.set_title(panel.title, fontsize=8)
 
 
 def _limits(runs: Sequence[Differences]) -> tuple[float, float]:
-    """Around all that is finite, with room on both sides of 0."""
-    told = np.concatenate([[*one.each, one.effect, one.low, one.high] for one in runs])
-    finite = told[np.isfinite(told)]
-    low, high = min(0.0, finite.min(initial=0.0)), max(0.0, finite.max(initial=0.0))
+    """Limits around all finite values, with room on both sides of 0."""
+    values = np.concatenate([[*one.each, one.effect, one.low, one.high] for one in runs])
+    finite = values[np.isfinite(values)]
+    low, high = finite.min(initial=0.0), finite.max(initial=0.0)
     room = 0.15 * (high - low) or 1.0
     return float(low - room), float(high + room)

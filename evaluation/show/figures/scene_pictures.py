@@ -1,7 +1,7 @@
 """Pictures of the augmented map (Fig. 5 and 15), rendered offscreen by pyrender.
 
-pyrender's shadows break on numpy 2, and clouds have no surfaces to light. Shape is made
-visible by darkening every pixel that has a nearer neighbour (eye-dome lighting).
+pyrender's shadows fail with numpy 2, and clouds have no surfaces to light. Every pixel that has
+a nearer neighbour is darkened instead, which makes shape visible (eye-dome lighting).
 """
 
 from __future__ import annotations
@@ -22,31 +22,33 @@ from evaluation.measure.showcase import Showcase
 if TYPE_CHECKING:
     import pyrender
 
-GROUND_COLOUR = (214, 62, 48)
-MAV_COLOUR = (150, 150, 150)
-GROUND_PATH = (34, 94, 214)
-MAV_PATH = (20, 158, 78)
-BACKGROUND = (250, 250, 248)
+Colour = tuple[int, int, int]
+GROUND_COLOUR: Colour = (214, 62, 48)
+MAV_COLOUR: Colour = (150, 150, 150)
+GROUND_PATH: Colour = (34, 94, 214)
+MAV_PATH: Colour = (20, 158, 78)
+BACKGROUND: Colour = (250, 250, 248)
 
 FIELD_OF_VIEW = np.radians(52.0)
 MARKER_M = 0.22
+"""Width of a camera's pyramid [m]."""
 PATH_RADIUS_M = 0.012
+FAR_M = 60.0
+"""Far plane [m]: beyond every scene."""
 
 
 @dataclass(frozen=True)
 class Viewpoint:
-    """Where a picture is taken from: eye and target in `ground` [m], z is up."""
+    """A camera of a picture: eye and target in `ground` [m], z is up."""
 
     eye: NDArray[np.float64]
     target: NDArray[np.float64]
 
     def camera_pose(self) -> NDArray[np.float64]:
         """(4, 4) pose of an OpenGL camera (x right, y up, looking along -z)."""
-        back = self.eye - self.target
-        back = back / np.linalg.norm(back)
+        back = _unit(self.eye - self.target)
         up = np.array([0.0, 0.0, 1.0]) if abs(back[2]) < 0.99 else np.array([0.0, 1.0, 0.0])
-        right = np.cross(up, back)
-        right /= np.linalg.norm(right)
+        right = _unit(np.cross(up, back))
         pose = np.eye(4)
         pose[:3, :3] = np.stack([right, np.cross(back, right), back], axis=1)
         pose[:3, 3] = self.eye
@@ -54,7 +56,7 @@ class Viewpoint:
 
 
 def robot_viewpoint(showcase: Showcase) -> Viewpoint:
-    """Over the ground robot's shoulder, towards what the MAV added."""
+    """Above and behind the ground robot, towards the points that the MAV added."""
     path = showcase.ground_path
     camera = path[len(path) // 2]
     target = _centre(showcase.aerial_cloud)
@@ -91,7 +93,8 @@ def render_augmented_map(
     blue, the MAV's green.
 
     Args:
-        view: Where from.
+        showcase: Source of clouds and paths.
+        view: Camera of the picture.
         size: Width and height of the picture [px].
 
     Returns:
@@ -102,10 +105,7 @@ def render_augmented_map(
 
     pose = view.camera_pose()
     scene = pyrender.Scene(ambient_light=(1.0, 1.0, 1.0), bg_color=(*BACKGROUND, 255))
-    for cloud, tint in (
-        (showcase.ground_cloud, GROUND_COLOUR),
-        (showcase.aerial_cloud, None),
-    ):
+    for cloud, tint in ((showcase.ground_cloud, GROUND_COLOUR), (showcase.aerial_cloud, None)):
         if len(cloud):
             scene.add(_splats(cloud, pose, tint))
     for path, colour, cameras in (
@@ -116,7 +116,7 @@ def render_augmented_map(
         shown = np.linspace(0, len(path) - 1, cameras).astype(int)
         edges = np.concatenate([_camera_edges(path[int(i)]) for i in shown])
         scene.add(_tubes(edges, 0.8 * PATH_RADIUS_M, colour))
-    scene.add(pyrender.PerspectiveCamera(yfov=FIELD_OF_VIEW, znear=0.1, zfar=60.0), pose=pose)
+    scene.add(pyrender.PerspectiveCamera(yfov=FIELD_OF_VIEW, znear=0.1, zfar=FAR_M), pose=pose)
 
     renderer = pyrender.OffscreenRenderer(*size)
     try:
@@ -126,18 +126,27 @@ def render_augmented_map(
     return _eye_dome_lighting(colour_image, depth)
 
 
+def tinted(colours: NDArray[np.uint8], tint: Colour | None) -> NDArray[np.uint8]:
+    """Grey values, or shades of one colour that keep the brightness of the original."""
+    grey = colours.astype(np.float32).mean(axis=1, keepdims=True)
+    if tint is None:
+        return np.repeat(grey, 3, axis=1).astype(np.uint8)
+    shade = 0.35 + 0.85 * grey / 255
+    return np.clip(shade * np.array(tint, np.float32), 0, 255).astype(np.uint8)
+
+
+def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
+
+
 def _centre(cloud: PointCloud) -> NDArray[np.float64]:
     if len(cloud) == 0:
         return np.zeros(3)
     return np.median(cloud.points, axis=0).astype(np.float64)
 
 
-def _splats(
-    cloud: PointCloud, pose: NDArray[np.float64], tint: tuple[int, int, int] | None
-) -> pyrender.Mesh:
-    """Every point as a square that faces the camera, as large as the points are apart."""
-    import pyrender
-
+def _splats(cloud: PointCloud, pose: NDArray[np.float64], tint: Colour | None) -> pyrender.Mesh:
+    """Every point as a square that faces the camera, as large as the spacing of the points."""
     points = cloud.points
     half = 0.5 * _splat_size(points)
     right, up = pose[:3, 0] * half, pose[:3, 1] * half
@@ -145,8 +154,7 @@ def _splats(
     positions = (points[:, None, :] + corners).reshape(-1, 3)
     first = 4 * np.arange(len(points))[:, None, None]
     triangles = (first + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
-    colours = np.repeat(tinted(cloud.colours, tint), 4, axis=0)
-    return _mesh(pyrender, positions, triangles, colours)
+    return _mesh(positions, triangles, np.repeat(tinted(cloud.colours, tint), 4, axis=0))
 
 
 def _splat_size(points: NDArray[np.float32]) -> float:
@@ -155,15 +163,6 @@ def _splat_size(points: NDArray[np.float32]) -> float:
     sample = points[:: max(1, len(points) // 2000)]
     spacing = cKDTree(points).query(sample, k=2)[0][:, 1]
     return float(np.clip(1.7 * np.median(spacing), 0.004, 0.05))
-
-
-def tinted(colours: NDArray[np.uint8], tint: tuple[int, int, int] | None) -> NDArray[np.uint8]:
-    """Grey values, or shades of one colour that keep the brightness of the original."""
-    grey = colours.astype(np.float32).mean(axis=1, keepdims=True)
-    if tint is None:
-        return np.repeat(grey, 3, axis=1).astype(np.uint8)
-    shade = 0.35 + 0.85 * grey / 255
-    return np.clip(shade * np.array(tint, np.float32), 0, 255).astype(np.uint8)
 
 
 def _path_segments(path: Trajectory) -> NDArray[np.float64]:
@@ -182,22 +181,14 @@ def _camera_edges(T_ground_camera: SE3) -> NDArray[np.float64]:
     return np.concatenate([sides, np.stack([base, np.roll(base, -1, axis=0)], axis=1)])
 
 
-def _tubes(
-    segments: NDArray[np.float64], radius: float, colour: tuple[int, int, int]
-) -> pyrender.Mesh:
+def _tubes(segments: NDArray[np.float64], radius: float, colour: Colour) -> pyrender.Mesh:
     """Segments (S, 2, 3) as six-sided tubes of one colour; lines would be one pixel wide."""
-    import pyrender
-
-    along = segments[:, 1] - segments[:, 0]
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    along = _unit(segments[:, 1] - segments[:, 0])
     helper = np.where(np.abs(along[:, 2:]) < 0.9, [[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]])
-    side = np.cross(along, helper)
-    side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-9)
+    side = _unit(np.cross(along, helper))
     other = np.cross(along, side)
-    angle = np.linspace(0, 2 * np.pi, 6, endpoint=False)
-    ring = radius * (
-        np.cos(angle)[None, :, None] * side[:, None] + np.sin(angle)[None, :, None] * other[:, None]
-    )
+    angle = np.linspace(0, 2 * np.pi, 6, endpoint=False)[None, :, None]
+    ring = radius * (np.cos(angle) * side[:, None] + np.sin(angle) * other[:, None])
     overlap = radius * along[:, None, :] * np.array([-1.0, 1.0])[None, :, None]
     ends = segments + overlap
     positions = (ends[:, :, None, :] + ring[:, None]).reshape(-1, 3)
@@ -205,27 +196,25 @@ def _tubes(
     n = (k + 1) % 6
     sides = np.concatenate([np.stack([k, n, n + 6], 1), np.stack([k, n + 6, k + 6], 1)])
     triangles = (12 * np.arange(len(segments))[:, None, None] + sides).reshape(-1, 3)
-    colours = np.repeat(np.array([colour], np.uint8), len(positions), axis=0)
-    return _mesh(pyrender, positions, triangles, colours)
+    return _mesh(positions, triangles, np.repeat([colour], len(positions), axis=0))
 
 
-def _mesh(
-    module: object, positions: NDArray, triangles: NDArray, colours: NDArray[np.uint8]
-) -> pyrender.Mesh:
-    """A mesh that shows its vertex colours as they are."""
+def _mesh(positions: NDArray, triangles: NDArray, colours: NDArray) -> pyrender.Mesh:
+    """A mesh that shows its vertex colours (0 to 255) as they are."""
+    import pyrender
+
     # pyrender's shader ends with a gamma of 1/2.2; undo it.
     linear = (colours.astype(np.float32) / 255) ** 2.2
-    opaque = np.concatenate([linear, np.ones((len(colours), 1), np.float32)], axis=1)
-    material = module.MetallicRoughnessMaterial(  # type: ignore[attr-defined]
+    material = pyrender.MetallicRoughnessMaterial(
         doubleSided=True, metallicFactor=0.0, roughnessFactor=1.0
     )
-    primitive = module.Primitive(  # type: ignore[attr-defined]
+    primitive = pyrender.Primitive(
         positions=positions.astype(np.float32),
         indices=triangles.astype(np.uint32),
-        color_0=opaque,
+        color_0=np.concatenate([linear, np.ones((len(linear), 1), np.float32)], axis=1),
         material=material,
     )
-    return module.Mesh(primitives=[primitive])  # type: ignore[attr-defined]
+    return pyrender.Mesh(primitives=[primitive])
 
 
 def _eye_dome_lighting(
@@ -236,12 +225,13 @@ def _eye_dome_lighting(
     Args:
         colours: (height, width, 3).
         depth: (height, width) [m], 0 where there is nothing.
+        strength: Factor of the darkening.
     """
-    far = np.log(np.where(depth > 0, depth, 60.0)).astype(np.float32)
+    far = np.log(np.where(depth > 0, depth, FAR_M)).astype(np.float32)
     darkness = np.zeros_like(far)
     for radius in (1, 4):
-        for dy, dx in ((0, radius), (0, -radius), (radius, 0), (-radius, 0)):
-            nearer = far - np.roll(far, (dy, dx), axis=(0, 1))
+        for shift in ((0, radius), (0, -radius), (radius, 0), (-radius, 0)):
+            nearer = far - np.roll(far, shift, axis=(0, 1))
             darkness += np.clip(nearer, 0, 0.12)
     shade = np.where(depth > 0, np.exp(-strength * darkness / 4), 1.0)
     return (colours * shade[..., None]).round().astype(np.uint8)

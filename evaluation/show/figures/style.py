@@ -1,23 +1,30 @@
-"""One look for all figures: calm, legible small, safe for colour-blind readers."""
+"""One look for all figures: legible in print, safe for colour-blind readers."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.colors import Colormap, LinearSegmentedColormap
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, NullFormatter
+from numpy.typing import NDArray
 
 SERIES = ("#0072B2", "#E69F00", "#009E73", "#CC79A7")
-"""Okabe and Ito's colours, one a condition."""
+"""Colours of conditions, by Okabe and Ito."""
 PAPER = "#D62246"
-"""The paper's published values, everywhere."""
+"""Colour of the paper's published values in every figure."""
 INK = "#222222"
 FAINT = "#8A8F98"
 HOLE = "#EFF0F2"
-"""Cells and pixels without a value."""
+"""Colour of cells and pixels without a value."""
+DASHED = (0, (5, 3))
+"""Line style of references: published values, limits, perfect agreement."""
 
 HEIGHT_COLOURS = "viridis"
 DEPTH_COLOURS = "viridis_r"
@@ -26,9 +33,12 @@ COST_COLOURS = LinearSegmentedColormap.from_list("cost", ["#000000", "#C4C8CE"])
 """Ends in grey, so that white lines stay visible on it."""
 
 WIDE_IN, COLUMN_IN = 7.16, 3.5
-"""Widths of figures: both columns of a paper, or one of them. Nothing is scaled in print."""
+"""Widths of figures [in]: both columns of a paper, or one. Print does not scale them."""
 SMALL_PT = 7.0
-"""The smallest text."""
+"""The smallest text [pt]."""
+LABEL_PT = 7.5
+"""Legends, and labels inside the axes [pt]."""
+PICTURE_DPI = 210
 
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -49,7 +59,7 @@ STYLE: dict[str, Any] = {
     "xtick.color": "#3A3F45",
     "ytick.color": "#3A3F45",
     "legend.frameon": False,
-    "legend.fontsize": 7.5,
+    "legend.fontsize": LABEL_PT,
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
     "figure.dpi": 100,
@@ -60,7 +70,24 @@ STYLE: dict[str, Any] = {
 styled = mpl.rc_context(STYLE)  # type: ignore[arg-type]
 """Decorator that gives a figure function this look."""
 
-PICTURE_DPI = 210
+
+@dataclass(frozen=True)
+class ReportFigure:
+    """A figure with its heading and caption.
+
+    Attributes:
+        name: Name of its files, without ending.
+        title: Heading.
+        caption: Content, conditions, and the published value to compare with.
+        figure: The drawing.
+        wide: Whether it needs the full width of a page.
+    """
+
+    name: str
+    title: str
+    caption: str
+    figure: Figure
+    wide: bool = True
 
 
 def colour_map(colours: str | Colormap, hole: str = HOLE) -> Colormap:
@@ -69,17 +96,41 @@ def colour_map(colours: str | Colormap, hole: str = HOLE) -> Colormap:
     return named.with_extremes(bad=hole)
 
 
+def value_range(values: NDArray, low: float, high: float) -> tuple[float, float]:
+    """Percentiles of the finite values, as limits of a colour map; 0 and 1 if there are none."""
+    finite = values[np.isfinite(values)]
+    if len(finite) == 0:
+        return 0.0, 1.0
+    lowest, highest = np.percentile(finite, [low, high])
+    return float(lowest), float(highest)
+
+
 def picture_axes(axes: Axes) -> None:
-    """Strip what a picture does not need."""
+    """Remove ticks and frame around a picture."""
     axes.set_xticks([])
     axes.set_yticks([])
     for spine in axes.spines.values():
         spine.set_visible(False)
 
 
+def plain_numbers(axis: Axis) -> None:
+    """Label a logarithmic axis with 0.01, 0.1, 1 in place of powers of ten."""
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def reference_line(axes: Axes, y: float, text: str) -> None:
+    """A horizontal line at a published value, with its label at the right end."""
+    axes.axhline(y, color=PAPER, linewidth=1.0, linestyle=DASHED)
+    axes.text(
+        1.005, y, text, transform=axes.get_yaxis_transform(), color=PAPER, va="center",
+        fontsize=LABEL_PT,
+    )  # fmt: skip
+
+
 @styled
 def save_picture(figure: Figure, folder: Path, name: str) -> None:
-    """Write `name`.png into a folder that exists; the same figure gives the same bytes."""
+    """Write `name`.png into an existing folder; the same figure gives the same bytes."""
     figure.savefig(folder / f"{name}.png", dpi=PICTURE_DPI, metadata={"Software": None})
 
 
@@ -88,7 +139,7 @@ def save_figure(figure: Figure, folder: Path, name: str) -> None:
     """Write `name`.png and `name`.pdf; the same figure gives the same bytes."""
     folder.mkdir(parents=True, exist_ok=True)
     save_picture(figure, folder, name)
-    # The layout is found; finding it again costs as much as drawing.
+    # The layout is known by now; a second search for it takes as long as drawing.
     figure.set_layout_engine("none")
     figure.savefig(
         folder / f"{name}.pdf",

@@ -21,7 +21,7 @@ from evaluation.measure.protocol.negatives import NO_OVERLAP, WRONG_MAP
 from evaluation.setup.condition import Condition
 from evaluation.setup.text import MISSING, TextTable, formatted
 from evaluation.show.figures.calibration import calibration_figure
-from evaluation.show.gallery.figures import ReportFigure
+from evaluation.show.figures.style import ReportFigure
 from evaluation.table.rows import ResultTable
 
 TITLES = {

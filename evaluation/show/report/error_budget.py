@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from evaluation.setup.condition import Condition
 from evaluation.setup.text import TextTable, degrees, metres
-from evaluation.show.figures.style import SERIES, WIDE_IN, styled
-from evaluation.show.gallery.figures import ReportFigure
+from evaluation.show.figures.style import SERIES, WIDE_IN, ReportFigure, styled
 from evaluation.table.intervals import quantile, wilson
 from evaluation.table.limits import GOOD_POSE, is_good_pose
 from evaluation.table.rows import ResultTable

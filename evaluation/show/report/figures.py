@@ -13,15 +13,18 @@ from evaluation.judge.metrics import METRICS
 from evaluation.measure.showcase import Showcase
 from evaluation.setup import published
 from evaluation.setup.condition import Condition, shared_parts, short_labels
-from evaluation.show.figures.localization_error import localization_error_figure, spread_figure
-from evaluation.show.figures.refinement_error import (
+from evaluation.show.figures.fig11_12_localization_error import (
+    localization_error_figure,
+    spread_figure,
+)
+from evaluation.show.figures.fig13_14_refinement_error import (
     BeforeAfter,
     refinement_angle_figure,
     refinement_translation_figure,
 )
-from evaluation.show.figures.style import SERIES
-from evaluation.show.figures.timing import timing_figure
-from evaluation.show.gallery.figures import ReportFigure, showcase_figures
+from evaluation.show.figures.showcase_figures import showcase_figures
+from evaluation.show.figures.style import SERIES, ReportFigure
+from evaluation.show.figures.table1_timing import timing_figure
 from evaluation.show.report.calibration import calibration_figures
 from evaluation.show.report.error_budget import budget_figure
 from evaluation.show.report.trajectories import trajectory_figures

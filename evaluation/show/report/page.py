@@ -18,8 +18,7 @@ from evaluation.setup import published
 from evaluation.setup.condition import Condition, shared_parts
 from evaluation.setup.run_info import RunInfo
 from evaluation.setup.settings import write_config
-from evaluation.show.figures.style import save_figure
-from evaluation.show.gallery.figures import ReportFigure
+from evaluation.show.figures.style import ReportFigure, save_figure
 from evaluation.show.report.baselines import baseline_table
 from evaluation.show.report.calibration import calibration_table, claims_table
 from evaluation.show.report.error_budget import budget_table

@@ -10,8 +10,8 @@ from evaluation.judge.poses import POSE_METRICS, ROBOTS, PoseMetric, read_poses
 from evaluation.setup import published
 from evaluation.setup.condition import Condition, short_labels
 from evaluation.setup.text import MISSING, TextTable
-from evaluation.show.figures.trajectory_error import ErrorOverTime, trajectory_error_figure
-from evaluation.show.gallery.figures import ReportFigure
+from evaluation.show.figures.fig09_10_trajectory_error import ErrorOverTime, trajectory_error_figure
+from evaluation.show.figures.style import ReportFigure
 from evaluation.table.intervals import with_failures
 from evaluation.table.rows import ResultTable
 

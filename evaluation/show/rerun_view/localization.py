@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from airground.core.belief import Belief, CostMap, HeightMap
 from airground.core.events import BeliefUpdated, CostMapComputed, HeightMapsMade
 from evaluation.run.onlooker import Seen
-from evaluation.show.figures.particles import PARTICLES
+from evaluation.show.figures.fig08_particles import PARTICLES
 from evaluation.show.figures.style import COST_COLOURS, HEIGHT_COLOURS
 from evaluation.show.rerun_view.depth_maps import cell_pixels, coloured, rgb, upright
 from evaluation.show.rerun_view.sensor_stream import COSTS, TRUTH, SensorStream

@@ -15,7 +15,7 @@ from evaluation.measure.baselines.feature_matching import _distinct, locate_came
 from evaluation.measure.baselines.interface import View
 from evaluation.measure.baselines.matched_images import MatchedImages
 from evaluation.measure.baselines.views import _likeness
-from evaluation.show.figures.matches import matches_figure
+from evaluation.show.figures.fig02_03_matches import matches_figure
 from tests.evaluation.measure.closed_worlds import T_GROUND_MAV, bare_floor, error_of, given_of
 
 CAMERA = PinholeCamera(320, 240, 200.0, 200.0, 159.5, 119.5)

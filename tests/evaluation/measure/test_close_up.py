@@ -23,8 +23,8 @@ from evaluation.measure import close_up as module
 from evaluation.measure.close_up import CloseUp
 from evaluation.measure.showcase import Showcase
 from evaluation.setup.setups import EXACT, Setup
+from evaluation.show.figures.showcase_figures import showcase_figures
 from evaluation.show.figures.style import save_picture
-from evaluation.show.gallery.figures import showcase_figures
 from evaluation.table.tracking_log import AnswerLog, FrontEndLog, Tracked
 from tests.evaluation.show import scripted_run as run
 from tests.evaluation.show.scripted_run import seen_events, show

@@ -13,15 +13,18 @@ from matplotlib.figure import Figure
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
 from evaluation.measure.showcase import Showcase
-from evaluation.show.figures.augmented_map import refinement_figure
-from evaluation.show.figures.boxes import draw_box, log_axis
-from evaluation.show.figures.depth_maps import completeness, depth_maps_figure
-from evaluation.show.figures.height_maps import draw_grid, height_maps_figure
-from evaluation.show.figures.localization_error import localization_error_figure
-from evaluation.show.figures.particles import covariance_ellipse, particles_figure
-from evaluation.show.figures.refinement_error import BeforeAfter, refinement_translation_figure
+from evaluation.show.figures.boxes import draw_boxes, log_axis
+from evaluation.show.figures.fig05_15_augmented_map import refinement_figure
+from evaluation.show.figures.fig06_depth_maps import completeness, depth_maps_figure
+from evaluation.show.figures.fig07_height_maps import draw_grid, height_maps_figure
+from evaluation.show.figures.fig08_particles import covariance_ellipse, particles_figure
+from evaluation.show.figures.fig11_12_localization_error import localization_error_figure
+from evaluation.show.figures.fig13_14_refinement_error import (
+    BeforeAfter,
+    refinement_translation_figure,
+)
 from evaluation.show.figures.style import COLUMN_IN, SMALL_PT, WIDE_IN, save_figure
-from evaluation.show.figures.timing import timing_figure
+from evaluation.show.figures.table1_timing import timing_figure
 from evaluation.show.report.figures import report_figures
 from tests.evaluation.synthetic_results import BEST, PAPER, make_showcase, make_table
 
@@ -41,7 +44,7 @@ def test_failures_are_counted_above_a_box() -> None:
     figure = Figure()
     axes = figure.subplots()
     log_axis(axes, [[0.1, 0.2, np.nan, np.inf]], floor=1e-3)
-    draw_box(axes, 1.0, [0.1, 0.2, np.nan, np.inf], 0.5, "black")
+    draw_boxes(axes, {"a": [[0.1, 0.2, np.nan, np.inf]]}, ["black"])
     assert "2✕" in _texts(figure)
 
 
@@ -49,8 +52,9 @@ def test_a_box_that_failures_reach_ends_at_the_top_of_the_axis() -> None:
     axes = Figure().subplots()
     values = [0.1, 0.2, np.nan, np.nan]
     log_axis(axes, [values], floor=1e-3)
-    draw_box(axes, 1.0, values, 0.5, "black")
-    outline = axes.lines[0].get_ydata()
+    draw_boxes(axes, {"a": [values]}, ["black"])
+    (box,) = axes.patches
+    outline = box.get_path().vertices[:, 1]  # type: ignore[index]
     assert np.max(outline) == pytest.approx(axes.get_ylim()[1])
 
 
@@ -58,8 +62,8 @@ def test_every_outlier_is_drawn() -> None:
     axes = Figure().subplots()
     values = np.append(np.linspace(0.1, 0.11, 30), [5.0, 7.0])
     log_axis(axes, [values], floor=1e-3)
-    draw_box(axes, 1.0, values, 0.5, "black")
-    np.testing.assert_array_equal(np.sort(axes.lines[-1].get_ydata()), [5.0, 7.0])
+    draw_boxes(axes, {"a": [values]}, ["black"])
+    np.testing.assert_array_equal(np.sort(axes.lines[-2].get_ydata()), [5.0, 7.0])
 
 
 def test_all_failed_still_draws() -> None:

@@ -13,9 +13,9 @@ from airground.pipeline import moved
 from evaluation import cli
 from evaluation.judge.results import Results
 from evaluation.measure.showcase import Showcase
+from evaluation.show.figures import landing as module
+from evaluation.show.figures.landing import END_MS, MAP_PX, PAUSE_MS, landing, save_landing
 from evaluation.show.figures.scene_pictures import render_augmented_map
-from evaluation.show.gallery import landing as module
-from evaluation.show.gallery.landing import END_MS, MAP_PX, PAUSE_MS, landing, save_landing
 from tests.evaluation.synthetic_results import make_showcase, make_table
 
 REFINED = SE3.from_heading(0.05, (0.1, 0.0, 0.0))

@@ -18,8 +18,7 @@ from evaluation.measure.protocol.trials import Protocol
 from evaluation.measure.work.crew import Crew
 from evaluation.measure.work.unit import Finished, Unit, UnitStore
 from evaluation.setup.setups import Setup
-from evaluation.show.figures.sweep_curves import sweep_figure
-from evaluation.show.sweep_results import print_sweep, write_sweep
+from evaluation.show.sweep_results import print_sweep, sweep_figure, write_sweep
 from evaluation.table.intervals import rate_within
 from evaluation.table.rows import ResultTable, Row
 from sim.scene import load_scene

@@ -1,4 +1,4 @@
-"""Fig. 2 and 3: what both robots see, and what feature matching finds between their images."""
+"""Fig. 2 and 3: images of both robots, and feature matches between them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,12 @@ from numpy.typing import NDArray
 
 from evaluation.measure.baselines.matched_images import MatchedImages
 from evaluation.measure.protocol.trials import spread_evenly
-from evaluation.show.figures.style import SERIES, WIDE_IN, picture_axes, styled
+from evaluation.show.figures.style import PAPER, SERIES, WIDE_IN, picture_axes, styled
+
+GAP_PX = 16
+DRAWN = 120
+"""Lines of a kind at most, spread evenly over the matches: more would hide the images."""
+AGREEING, OTHERS = SERIES[2], PAPER
 
 
 @styled
@@ -26,12 +31,6 @@ def views_figure(mav_image: NDArray[np.uint8], ground_image: NDArray[np.uint8]) 
     return figure
 
 
-GAP_PX = 16
-DRAWN = 120
-"""Lines of a kind at most, spread evenly over the matches: more would hide the images."""
-AGREEING, OTHERS = SERIES[2], "#D62246"
-
-
 @styled
 def matches_figure(matched: MatchedImages) -> Figure:
     """Both images side by side; green lines agree with one pose, thin red ones do not."""
@@ -41,15 +40,16 @@ def matches_figure(matched: MatchedImages) -> Figure:
     axes = figure.subplots()
     axes.imshow(picture, cmap="gray", vmin=0, vmax=255)
     lines = np.stack([matched.aerial_px, matched.ground_px + shift], axis=1)
-    for kept, colour, thickness, opacity in (
+    for chosen, colour, width, opacity in (
         (~matched.agrees, OTHERS, 0.35, 0.4),
         (matched.agrees, AGREEING, 0.5, 0.8),
     ):
-        drawn = lines[_some(np.flatnonzero(kept))]
+        ends = lines[chosen]
+        ends = ends[spread_evenly(len(ends), DRAWN)]
         axes.add_collection(
-            LineCollection(list(drawn), colors=colour, linewidths=thickness, alpha=opacity)
+            LineCollection(list(ends), colors=colour, linewidths=width, alpha=opacity)
         )
-        axes.plot(*drawn.reshape(-1, 2).T, ".", color=colour, alpha=opacity, markersize=1.6)
+        axes.plot(*ends.reshape(-1, 2).T, ".", color=colour, alpha=opacity, markersize=1.6)
     axes.set_xlim(-0.5, picture.shape[1] - 0.5)
     axes.set_ylim(picture.shape[0] - 0.5, -0.5)
     axes.set_title(
@@ -60,14 +60,10 @@ def matches_figure(matched: MatchedImages) -> Figure:
     return figure
 
 
-def _some(indices: NDArray[np.int64]) -> NDArray[np.int64]:
-    return indices[spread_evenly(len(indices), DRAWN)]
-
-
 def _side_by_side(
     left: NDArray[np.uint8], right: NDArray[np.uint8]
 ) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
-    """One picture with a white gap, and where the right image's pixel (0, 0) lies in it."""
+    """One picture with a white gap, and the place of the right image's pixel (0, 0) in it."""
     height = max(left.shape[0], right.shape[0])
     start = left.shape[1] + GAP_PX
     picture = np.full((height, start + right.shape[1]), 255, np.uint8)

@@ -1,4 +1,4 @@
-"""Fig. 8: the particles over three successive aerial maps."""
+"""Fig. 8: the particles over successive aerial maps."""
 
 from __future__ import annotations
 
@@ -10,25 +10,25 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from evaluation.measure.showcase import LocalizationStep
-from evaluation.show.figures.height_maps import draw_costs, mark_truth
+from evaluation.show.figures.fig07_height_maps import draw_costs, mark_truth
 from evaluation.show.figures.style import WIDE_IN, styled
 
 PARTICLES = "#35C46A"
 ZOOM_BELOW_M = 0.25
-"""Particles that spread over less are also drawn enlarged."""
+"""Particles with a smaller spread are also drawn enlarged."""
 ZOOM_M = 0.3
 """Half the side of the enlarged square."""
 
 
 @styled
 def particles_figure(steps: tuple[LocalizationStep, ...]) -> Figure:
-    """One panel a step: cost map, particles, their covariance (2 sigma), the truth."""
+    """One panel per aerial map: cost map, particles, their covariance (2 sigma), the truth."""
     figure = Figure(figsize=(WIDE_IN, WIDE_IN / len(steps) + 0.35), layout="constrained")
     panels = figure.subplots(1, len(steps), squeeze=False)[0]
     for number, (axes, step) in enumerate(zip(panels, steps, strict=True), 1):
-        _draw_step(axes, step, legend=True)
+        _draw_step(axes, step)
         error = float(np.linalg.norm(step.belief.estimate[:2] - step.true_u))
-        axes.set_title(f"{number}  off {error:.2f} m, spread {step.belief.spread_m:.2f} m")
+        axes.set_title(f"{number}  error {error:.2f} m, spread {step.belief.spread_m:.2f} m")
         axes.set_xlabel("x [m]")
         if step.belief.spread_m < ZOOM_BELOW_M:
             _zoom(axes, step)
@@ -37,18 +37,13 @@ def particles_figure(steps: tuple[LocalizationStep, ...]) -> Figure:
     return figure
 
 
-def _draw_step(axes: Axes, step: LocalizationStep, legend: bool) -> None:
-    made, belief = step.cost_map, step.belief
-    draw_costs(axes, made.costs, made.origin, made.cells_per_m)
+def _draw_step(axes: Axes, step: LocalizationStep) -> None:
+    belief = step.belief
+    draw_costs(axes, step.cost_map)
     axes.plot(
-        *belief.particles[:, :2].T,
-        ".",
-        color=PARTICLES,
-        markersize=3.6,
-        markeredgewidth=0,
-        alpha=0.85,
-        label=f"{len(belief.particles)} particles" if legend else None,
-    )
+        *belief.particles[:, :2].T, ".", color=PARTICLES, markersize=3.6, markeredgewidth=0,
+        alpha=0.85, label=f"{len(belief.particles)} particles",
+    )  # fmt: skip
     axes.add_patch(covariance_ellipse(belief.estimate[:2], belief.covariance))
     mark_truth(axes, step.true_u)
 
@@ -60,11 +55,8 @@ def _zoom(axes: Axes, step: LocalizationStep) -> None:
     column = 0.62 if x < (left + right) / 2 else 0.02
     row = 0.62 if y < (bottom + top) / 2 else 0.02
     inset = axes.inset_axes((column, row, 0.36, 0.36))
-    _draw_step(inset, step, legend=False)
-    inset.set_xlim(x - ZOOM_M, x + ZOOM_M)
-    inset.set_ylim(y - ZOOM_M, y + ZOOM_M)
-    inset.set_xticks([])
-    inset.set_yticks([])
+    _draw_step(inset, step)
+    inset.set(xlim=(x - ZOOM_M, x + ZOOM_M), ylim=(y - ZOOM_M, y + ZOOM_M), xticks=[], yticks=[])
     for spine in inset.spines.values():
         spine.set_visible(True)
     axes.indicate_inset_zoom(inset, edgecolor="black", alpha=0.7)
