@@ -27,7 +27,7 @@ from evaluation.table.limits import (
     REFINED_DEG,
     REFINED_M,
 )
-from evaluation.table.rows import ResultTable
+from evaluation.table.rows import ALIGNMENT_STAGE, ResultTable
 
 UnitOfObservation = Literal["recording", "surface", "sequence", "aerial map", "trial"]
 
@@ -256,6 +256,14 @@ SHOWN = (
     Metric(
         "localization_12", "localization error, map 12", "m", "lower", "sequence",
         samples.localization("error_m", 12), math.inf, iteration=12,
+    ),
+    Metric(
+        "aligned_well", f"pipeline's own alignments within {GOOD_POSE}", "", "higher",
+        "aerial map", samples.aligned_well, 0.0, share=True,
+    ),
+    Metric(
+        "aligned_translation", "pipeline's own alignments, position", "m", "lower", "aerial map",
+        samples.values(ALIGNMENT_STAGE, "after_translation_m"), math.inf,
     ),
 )  # fmt: skip
 """Metrics that reports show and verdicts do not judge."""

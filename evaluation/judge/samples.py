@@ -10,7 +10,7 @@ import pandas as pd
 
 from evaluation.measure.protocol import wide_search
 from evaluation.table.limits import LOCATED_M, is_good_pose
-from evaluation.table.rows import SEQUENCE_KEYS, TRIAL_KEYS, ResultTable
+from evaluation.table.rows import ALIGNMENT_STAGE, SEQUENCE_KEYS, TRIAL_KEYS, ResultTable
 
 DIGITS = 5
 """Significant digits kept: far finer than any effect that matters, and short in a file."""
@@ -131,6 +131,16 @@ def refined(metric: str) -> Take:
         return trials[metric] if metric in trials else _nothing(TRIAL_KEYS)
 
     return take
+
+
+def aligned_well(table: ResultTable) -> pd.Series:
+    """1 where the pipeline aligned a sighting by itself, accepted it, and is right; else 0."""
+    accepted = values(ALIGNMENT_STAGE, "accepted")(table)
+    off_m, off_deg = (
+        values(ALIGNMENT_STAGE, f"after_{what}")(table).reindex(accepted.index)
+        for what in ("translation_m", "rotation_deg")
+    )
+    return ((accepted > 0) & is_good_pose(off_m, off_deg)).astype(float)
 
 
 def refined_well(table: ResultTable) -> pd.Series:

@@ -19,6 +19,9 @@ CONTROL_SCENES = frozenset({"flat"})
 CLOCK_STAGES = frozenset({"timing", "run"})
 """Stages whose rows depend on the machine and on what else it does."""
 
+ALIGNMENT_STAGE = "alignment"
+"""Stage of the pipeline's own alignments, by sighting; that of trials is "refinement"."""
+
 LIVE_STAGE = "realtime"
 """Of rows that only a live run writes."""
 SEQUENCE_KEYS = ["scene", "seed", "flight", "sequence"]

@@ -40,7 +40,7 @@ from evaluation.run.onlooker import STAGE_OF
 from evaluation.run.tracking import localizer_rng
 from evaluation.setup.memory import peak_memory_mib
 from evaluation.table.row_writer import RowWriter
-from evaluation.table.rows import ResultTable
+from evaluation.table.rows import ALIGNMENT_STAGE, ResultTable
 from evaluation.table.tracking_quality import add_tracking
 from evaluation.table.truth_errors import (
     pose_error,
@@ -160,10 +160,13 @@ def _add_alignments(out: RowWriter, maps: Maps, localized: Localized, truth: Tru
     """The pipeline's own alignments, from where its particles put each aerial map."""
     found = zip(maps.sightings, localized.beliefs, localized.alignments, strict=True)
     for trial, (sighting, belief, alignment) in enumerate(found):
-        if alignment is not None:
+        if alignment is None:
+            note = "no position was claimed"
+            out.add(ALIGNMENT_STAGE, "accepted", 0.0, "", trial=trial, note=note)
+        else:
             poses = {"before": belief.T_ground_mav, "after": alignment.T_ground_mav}
             errors = {when: pose_error(pose, sighting, truth) for when, pose in poses.items()}
-            out.add_alignment(alignment, errors, trial, stage="alignment")
+            out.add_alignment(alignment, errors, trial, ALIGNMENT_STAGE)
 
 
 def _add_sequences(

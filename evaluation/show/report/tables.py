@@ -211,6 +211,8 @@ _COMPARED_ROWS: tuple[tuple[str, str, Cell], ...] = (
     _row("posed_4"),
     _row("localization_4"),
     _row("localization_12"),
+    _row("aligned_translation"),
+    _row("aligned_well"),
     ("localizations that claim a position", MISSING, _claims(wrong=False)),
     (f"claims that are off by more than {LOCATED_M:g} m", MISSING, _claims(wrong=True)),
     (

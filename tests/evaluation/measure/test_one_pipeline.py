@@ -33,6 +33,8 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def values(table: ResultTable, stage: str, number: int | None = None) -> list[tuple[object, ...]]:
     """Rows of a stage, without notes, in their order."""
     frame = table.frame[table.frame["stage"] == stage]
+    frame = frame[frame["note"] != "no position was claimed"]
+    frame = frame.assign(trial=frame["trial"].rank(method="dense"))
     if number is not None:
         frame = frame[(frame["sequence"] == number) & (frame["iteration"] <= LENGTH)]
     keys = ["metric", "iteration", "trial", "time_s", "value"]
