@@ -62,14 +62,14 @@ def _image_width(material: Material, width_px: float) -> Work:
 
     views = [shrunk(view) for view in sweep.views]
     small = Sweep(resized(sweep.camera, *size), shrunk(sweep.reference), views, sweep.config)
-    return Work(small.add_next, small.ready)
+    return Work(small.add_next, small.make_ready)
 
 
 def _hypotheses(material: Material, planes: float) -> Work:
     config = material.config
     parameters = config.plane_sweep.model_copy(update={"hypotheses": round(planes)})
     sweep = sweep_of(material, config.model_copy(update={"plane_sweep": parameters}))
-    return Work(sweep.add_next, sweep.ready)
+    return Work(sweep.add_next, sweep.make_ready)
 
 
 def _voxels(material: Material, millions: float) -> Work:

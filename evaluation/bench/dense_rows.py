@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airground.config import Config, paper
 from airground.core.camera import PinholeCamera
+from airground.core.cloud import PointCloud
 from airground.core.surface import DepthMap
 from airground.dense.depth_refinement import depth_from_costs
 from airground.dense.distance_field import MAX_DEPTH_MAPS, FieldHistogram
@@ -33,66 +32,57 @@ DECODED = 60
 """Images read in turn: some tens of MB, which the system keeps in memory."""
 
 
-@dataclass
 class Sweep:
     """One depth map under construction, view after view as the pipeline adds them.
 
-    Attributes:
+    Args:
         camera: Intrinsics of the images.
         reference: View of the depth map.
         views: Views that are compared with it, in order of time.
         config: The pipeline's parameters.
     """
 
-    camera: PinholeCamera
-    reference: PosedImage
-    views: list[PosedImage]
-    config: Config
-    _workspace: Workspace = field(default_factory=Workspace)
-    _sweep: PlaneSweep | None = None
-    _added: int = 0
-    _planes: NDArray[np.float64] = field(init=False)
-
-    def __post_init__(self) -> None:
-        before = [view for view in self.views if view.stamp_ns < self.reference.stamp_ns]
-        extent = scene_extent(self.reference, before or self.views, self.camera)
+    def __init__(
+        self,
+        camera: PinholeCamera,
+        reference: PosedImage,
+        views: list[PosedImage],
+        config: Config,
+    ) -> None:
+        before = [view for view in views if view.stamp_ns < reference.stamp_ns]
+        extent = scene_extent(reference, before or views, camera)
         if extent is None:
             raise InputError("the views show too little texture for the depth of the scene")
-        self._planes = inverse_depth_planes(
-            extent.near_m, extent.far_m, self.config.plane_sweep.hypotheses
+        self.camera, self.reference, self.views, self.config = camera, reference, views, config
+        self.sides = 2 if config.view_selection.both_sides else 1
+        # A depth map has half of the image's width and height.
+        self.pixels = (camera.width // 2) * (camera.height // 2)
+        self.planes = config.plane_sweep.hypotheses
+        self.size = f"{camera.width} x {camera.height} px, {self.planes} hypotheses"
+        self._inverse_depths = inverse_depth_planes(extent.near_m, extent.far_m, self.planes)
+        self._workspace = Workspace()
+        self._sweep: PlaneSweep | None = None
+        self._added = 0
+
+    def begin(self) -> None:
+        """Begin a new depth map in the memory of the one before."""
+        if self._sweep is not None:
+            self._sweep.release()
+        self._sweep = PlaneSweep(
+            self.reference.image,
+            self.camera,
+            self.reference.T_mav_camera,
+            self._inverse_depths,
+            self.config.plane_sweep,
+            self.sides,
+            self._workspace,
         )
+        self._added = 0
 
-    @property
-    def sides(self) -> int:
-        return 2 if self.config.view_selection.both_sides else 1
-
-    @property
-    def pixels(self) -> int:
-        """Pixels of the depth map, which has half of the image's width and height."""
-        return (self.camera.width // 2) * (self.camera.height // 2)
-
-    @property
-    def size(self) -> str:
-        return (
-            f"{self.camera.width} x {self.camera.height} px, "
-            f"{self.config.plane_sweep.hypotheses} hypotheses"
-        )
-
-    def ready(self) -> None:
-        """Begin a new depth map when all views are in."""
+    def make_ready(self) -> None:
+        """Begin a new depth map if all views are in."""
         if self._sweep is None or self._added == len(self.views):
-            if self._sweep is not None:
-                self._sweep.release()
-            self._sweep = PlaneSweep(
-                self.reference.image,
-                self.camera,
-                self.reference.T_mav_camera,
-                self._planes,
-                self.config.plane_sweep,
-                self.sides,
-                self._workspace,
-            )
-            self._added = 0
+            self.begin()
 
     def add_next(self) -> None:
         """Compare the next view with the reference."""
@@ -104,8 +94,7 @@ class Sweep:
 
     def complete(self) -> PlaneSweep:
         """The sweep with all its views."""
-        self._sweep = None
-        self.ready()
+        self.begin()
         for _ in self.views:
             self.add_next()
         assert self._sweep is not None
@@ -125,8 +114,8 @@ def with_paper_planes(config: Config) -> Config:
 
 def add_frame(material: Material) -> Work:
     sweep = sweep_of(material, with_paper_planes(material.config))
-    floor = floors.add_frame(sweep.pixels, sweep.config.plane_sweep.hypotheses)
-    return Work(sweep.add_next, sweep.ready, sweep.size, floor)
+    floor = floors.add_frame(sweep.pixels, sweep.planes)
+    return Work(sweep.add_next, sweep.make_ready, sweep.size, floor)
 
 
 def depth_map(material: Material) -> Work:
@@ -140,88 +129,74 @@ def depth_map(material: Material) -> Work:
     return Work(lambda: depth_from_costs(finished, parameters), size=size, floor=floor)
 
 
-@dataclass
 class VoxelWork:
     """The volume of one surface and what is computed in it, with memory kept between calls.
 
-    Attributes:
+    Args:
         depth_maps: Depth maps that are fused.
         config: The pipeline's parameters.
     """
 
-    depth_maps: list[DepthMap]
-    config: Config
-    histogram: FieldHistogram = field(init=False)
-    fusion: Fusion = field(init=False)
-
-    def __post_init__(self) -> None:
-        fusion = self.config.fusion
-        self.fusion = Fusion(fusion.data_weight, fusion.iterations, fusion.bins)
-        self.histogram = FieldHistogram(self.volume(), fusion.truncation_m, fusion.bins)
-
-    @property
-    def reference(self) -> DepthMap:
-        return self.depth_maps[len(self.depth_maps) // 2]
-
-    @property
-    def voxels(self) -> int:
-        return math.prod(self.config.fusion.voxels)
-
-    @property
-    def pixels(self) -> int:
-        return self.config.fusion.voxels[0] * self.config.fusion.voxels[1]
-
-    @property
-    def size(self) -> str:
-        return " x ".join(map(str, self.config.fusion.voxels)) + " voxels"
-
-    def volume(self) -> Volume:
-        """The volume that all depth maps saw."""
-        fusion = self.config.fusion
-        return Volume.around(self.depth_maps, self.reference, fusion.voxels, fusion.truncation_m)
-
-    def empty(self, volume: Volume | None = None) -> None:
-        """A new histogram in the old one's memory, over the same volume if None."""
-        fusion, old = self.config.fusion, self.histogram
-        self.histogram = FieldHistogram(
-            volume or old.volume, fusion.truncation_m, fusion.bins, old.counts
+    def __init__(self, depth_maps: list[DepthMap], config: Config) -> None:
+        self.depth_maps, self.parameters = depth_maps, config.fusion
+        self.reference = depth_maps[len(depth_maps) // 2]
+        nx, ny, nz = self.parameters.voxels
+        self.voxels, self.pixels = nx * ny * nz, nx * ny
+        self.size = f"{nx} x {ny} x {nz} voxels"
+        self._fusion = Fusion(
+            self.parameters.data_weight, self.parameters.iterations, self.parameters.bins
         )
+        self._counts: NDArray[np.uint32] | None = None
+        self._histogram = self._empty(self._volume())
 
     def make_room(self) -> None:
-        """A new histogram when this one is full."""
-        if self.histogram.depth_maps >= MAX_DEPTH_MAPS:
-            self.empty()
+        """Empty the histogram if it is full."""
+        if self._histogram.depth_maps >= MAX_DEPTH_MAPS:
+            self._histogram = self._empty(self._histogram.volume)
 
     def add_one(self) -> None:
         """The distance field of a depth map, another one each time."""
-        self.histogram.add(self.depth_maps[self.histogram.depth_maps % len(self.depth_maps)])
+        self._histogram.add(self.depth_maps[self._histogram.depth_maps % len(self.depth_maps)])
 
-    def add_all(self, volume: Volume | None = None) -> None:
+    def add_all(self) -> None:
         """The distance fields of all depth maps."""
-        self.empty(volume)
+        self._histogram = self._empty(self._volume())
         for depth_map in self.depth_maps:
-            self.histogram.add(depth_map)
+            self._histogram.add(depth_map)
 
     def fuse(self) -> NDArray[np.float32]:
-        return self.fusion.fuse(self.histogram.counts)
+        return self._fusion.fuse(self._histogram.counts)
 
-    def cast(self, phi: NDArray[np.float32]) -> object:
+    def cast(self, phi: NDArray[np.float32]) -> PointCloud:
         """The points of the fused surface."""
-        fusion, volume = self.config.fusion, self.histogram.volume
+        volume, parameters = self._histogram.volume, self.parameters
         depth, normals = cast_surface(
             volume,
             phi,
-            self.histogram.counts,
-            fusion.min_observations,
-            fusion.truncation_m,
-            fusion.bins,
+            self._histogram.counts,
+            parameters.min_observations,
+            parameters.truncation_m,
+            parameters.bins,
         )
         return surface_cloud(volume, depth, normals, self.reference)
 
-    def all_of_it(self) -> object:
+    def all_of_it(self) -> PointCloud:
         """From depth maps to points."""
-        self.add_all(self.volume())
+        self.add_all()
         return self.cast(self.fuse())
+
+    def _volume(self) -> Volume:
+        parameters = self.parameters
+        return Volume.around(
+            self.depth_maps, self.reference, parameters.voxels, parameters.truncation_m
+        )
+
+    def _empty(self, volume: Volume) -> FieldHistogram:
+        """A new histogram in the memory of the old one."""
+        parameters = self.parameters
+        histogram = FieldHistogram(volume, parameters.truncation_m, parameters.bins, self._counts)
+        self._counts = histogram.counts
+        return histogram
 
 
 def distance_field(material: Material) -> Work:
@@ -232,7 +207,7 @@ def distance_field(material: Material) -> Work:
 def fusion(material: Material) -> Work:
     work = VoxelWork(material.depth_maps, material.config)
     work.add_all()
-    parameters = work.config.fusion
+    parameters = work.parameters
     floor = floors.fusion(work.voxels, parameters.iterations, parameters.bins)
     return Work(work.fuse, size=f"{work.size}, {parameters.iterations} iterations", floor=floor)
 
@@ -241,15 +216,14 @@ def ray_cast(material: Material) -> Work:
     work = VoxelWork(material.depth_maps, material.config)
     work.add_all()
     phi = work.fuse()
-    return Work(
-        lambda: work.cast(phi), size=work.size, floor=floors.ray_cast(work.voxels, work.pixels)
-    )
+    floor = floors.ray_cast(work.voxels, work.pixels)
+    return Work(lambda: work.cast(phi), size=work.size, floor=floor)
 
 
 def surface(material: Material) -> Work:
     """Fields, fusion and casting of one surface, which other libraries do in one step."""
     work = VoxelWork(material.depth_maps, material.config)
-    parameters, count = work.config.fusion, len(work.depth_maps)
+    parameters, count = work.parameters, len(work.depth_maps)
     floor = floors.distance_field(work.voxels) * count
     floor += floors.fusion(work.voxels, parameters.iterations, parameters.bins)
     floor += floors.ray_cast(work.voxels, work.pixels)

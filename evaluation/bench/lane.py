@@ -6,13 +6,13 @@ serve two numbers. A lane of one core is bound to one: no thread of any library 
 
 from __future__ import annotations
 
-import importlib.util
 import multiprocessing
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Concatenate, ParamSpec, TypeVar
 
@@ -82,9 +82,10 @@ class Lane:
         """Make a row's work, and forget that of the row before."""
         self.clear()
         work, peers = self._work(Contender(row)), BY_NAME[row].peers
-        there = [peer.name for peer in peers if importlib.util.find_spec(peer.package) is not None]
-        missing = tuple(peer.name for peer in peers if peer.name not in there)
-        return Facts(work.size, work.floor, tuple(there), missing)
+        there = {p.name: not p.package or find_spec(p.package) is not None for p in peers}
+        installed = tuple(name for name, is_there in there.items() if is_there)
+        missing = tuple(name for name, is_there in there.items() if not is_there)
+        return Facts(work.size, work.floor, installed, missing)
 
     def take_turn(self, contender: Contender | CurvePoint, seconds: float) -> Turn:
         """Call a contender's work until the time is up."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -185,33 +185,31 @@ class MemoryLog:
             self.resident_mib += [] if now_mib is None else [now_mib]
 
 
-@dataclass
 class _Gathering:
     """Consumes the pipeline's events, and keeps the material of one surface."""
 
-    recording: Recording
-    config: Config
-    pipeline: Pipeline
-    kept: Material | None = None
-    _aligned: int = 0
-    _poses: dict[int, SE3] = field(default_factory=dict)
-    _views: dict[int, list[int]] = field(default_factory=dict)
-    _made: dict[int, DepthMap] = field(default_factory=dict)
-    _fused: list[DepthMap] = field(default_factory=list)
-    _of_surface: list[DepthMap] = field(default_factory=list)
-    _latest: tuple[Sighting, list[DepthMap]] | None = None
+    def __init__(self, recording: Recording, config: Config, pipeline: Pipeline) -> None:
+        self._recording, self._config, self._pipeline = recording, config, pipeline
+        self._kept: Material | None = None
+        self._aligned = 0
+        self._poses: dict[int, SE3] = {}
+        self._views: dict[int, list[int]] = {}
+        self._made: dict[int, DepthMap] = {}
+        self._fused: list[DepthMap] = []
+        self._of_surface: list[DepthMap] = []
+        self._latest: tuple[Sighting, list[DepthMap]] | None = None
 
     @property
     def complete(self) -> bool:
         return self._aligned >= ALIGNED_SURFACES
 
     def material(self) -> Material:
-        if self.kept is None:
+        if self._kept is None:
             raise InputError(
-                f"{self.recording.path}: no aerial surface could be aligned with the ground map, "
+                f"{self._recording.path}: no aerial surface could be aligned with the ground map, "
                 "so there is nothing to time; give another --recording"
             )
-        return self.kept
+        return self._kept
 
     def see(self, seen: Seen) -> None:
         if self.complete:
@@ -232,31 +230,28 @@ class _Gathering:
                 self._latest = (event.sighting, self._of_surface)
             case Aligned() if event.alignment.accepted and self._latest is not None:
                 self._aligned += 1
-                self.kept = self._chosen(*self._latest, event.alignment.T_ground_mav)
+                self._kept = self._material(*self._latest, event.alignment.T_ground_mav)
 
-    def _chosen(
+    def _material(
         self, sighting: Sighting, depth_maps: list[DepthMap], T_ground_mav: SE3
     ) -> Material:
         reference_ns = depth_maps[len(depth_maps) // 2].stamp_ns
+        ground_map = self._pipeline.mapping.ground_map
+        assert isinstance(ground_map, GroundMap)
         return Material(
-            self.recording,
-            self.config,
-            self.recording.mav.calibration.camera,
-            self.recording.ground.calibration.camera,
+            self._recording,
+            self._config,
+            self._recording.mav.calibration.camera,
+            self._recording.ground.calibration.camera,
             depth_maps,
             self._posed(reference_ns),
             [self._posed(stamp_ns) for stamp_ns in sorted(self._views[reference_ns])],
             sighting,
             T_ground_mav,
-            self.recording.ground.image_at(sighting.ground_stamp_ns),
-            self._ground_field(),
+            self._recording.ground.image_at(sighting.ground_stamp_ns),
+            ground_map.field().copy(),
         )
 
-    def _ground_field(self) -> BlockedField:
-        ground_map = self.pipeline.mapping.ground_map
-        assert isinstance(ground_map, GroundMap)
-        return ground_map.field().copy()
-
     def _posed(self, stamp_ns: int) -> PosedImage:
-        image = self.recording.mav.image_at(stamp_ns).image
+        image = self._recording.mav.image_at(stamp_ns).image
         return PosedImage(stamp_ns, image, self._poses[stamp_ns])

@@ -15,7 +15,9 @@ import open3d as o3d
 from numpy.typing import NDArray
 
 from airground.config import paper
+from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
+from airground.core.se3 import SE3
 from airground.core.surface import DepthMap
 from airground.dense.plane_sweep import halved, inverse_depth_planes
 from airground.dense.scene_extent import scene_extent
@@ -30,6 +32,8 @@ FIRST_BLOCKS = 20_000
 """Blocks that Open3D's grids have room for at first: enough for one surface."""
 NEIGHBOURS = 10
 """Points that a normal is estimated from, as in ours."""
+Reach = tuple[float, float, float]
+"""Scale of depth, largest depth [m], truncation [voxels]."""
 
 
 @dataclass(frozen=True)
@@ -38,15 +42,15 @@ class Peer:
 
     Attributes:
         name: Name for readers.
-        package: Module that it imports.
-        differs: How its work differs from ours.
         make: Makes its work from the material.
+        differs: How its work differs from ours.
+        package: Module that need not be installed; empty if none.
     """
 
     name: str
-    package: str
-    differs: str
     make: Callable[[Material], Work]
+    differs: str
+    package: str = ""
 
 
 def masked_correlation(material: Material) -> Work:
@@ -118,8 +122,8 @@ def plane_by_plane(material: Material) -> Work:
 
 def integrate_one(material: Material) -> Work:
     """Open3D: one depth map into a truncated signed distance field of hashed blocks."""
-    grid = _Grid(material)
-    return Work(lambda: grid.integrate(material.reference_depth))
+    grid, reach = _surface_grid(material)
+    return Work(lambda: _integrate_depth_map(grid, material.reference_depth, reach))
 
 
 def integrate_and_extract(material: Material) -> Work:
@@ -130,67 +134,70 @@ def integrate_and_extract(material: Material) -> Work:
     """
 
     def build() -> object:
-        grid = _Grid(material)
+        grid, reach = _surface_grid(material)
         for depth_map in material.depth_maps:
-            grid.integrate(depth_map)
-        return grid.extract()
+            _integrate_depth_map(grid, depth_map, reach)
+        return grid.extract_point_cloud(material.config.fusion.min_observations - 0.5)
 
     return Work(build)
 
 
-class _Grid:
+def _surface_grid(material: Material) -> tuple[o3d.t.geometry.VoxelBlockGrid, Reach]:
     """Open3D's distance field with voxels as wide as ours are in the middle of the volume."""
+    fusion = material.config.fusion
+    volume = Volume.around(
+        material.depth_maps, material.reference_depth, fusion.voxels, fusion.truncation_m
+    )
+    voxel_m = 0.5 * (volume.near_m + volume.far_m) / volume.camera.fx
+    grid = o3d.t.geometry.VoxelBlockGrid(
+        attr_names=("tsdf", "weight"),
+        attr_dtypes=(o3d.core.float32,) * 2,
+        attr_channels=[o3d.core.SizeVector([1])] * 2,
+        voxel_size=voxel_m,
+        block_resolution=BLOCK,
+        block_count=FIRST_BLOCKS,
+    )
+    return grid, (1.0, volume.far_m + 1.0, fusion.truncation_m / voxel_m)
 
-    def __init__(self, material: Material) -> None:
-        fusion = material.config.fusion
-        volume = Volume.around(
-            material.depth_maps, material.reference_depth, fusion.voxels, fusion.truncation_m
-        )
-        self._far_m = volume.far_m + 1.0
-        middle_m = 0.5 * (volume.near_m + volume.far_m)
-        voxel_m = middle_m / volume.camera.fx
-        self._truncation_voxels = fusion.truncation_m / voxel_m
-        self._weight = float(fusion.min_observations)
-        self._grid = o3d.t.geometry.VoxelBlockGrid(
-            attr_names=("tsdf", "weight"),
-            attr_dtypes=(o3d.core.float32,) * 2,
-            attr_channels=[o3d.core.SizeVector([1])] * 2,
-            voxel_size=voxel_m,
-            block_resolution=BLOCK,
-            block_count=FIRST_BLOCKS,
-        )
 
-    def integrate(self, depth_map: DepthMap) -> None:
-        seen = np.nan_to_num(depth_map.depth, nan=0.0)
-        depth = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(seen))
-        intrinsics = o3d.core.Tensor.from_numpy(depth_map.camera.matrix())
-        extrinsics = o3d.core.Tensor.from_numpy(depth_map.T_mav_camera.inverse().matrix())
-        reach = (1.0, self._far_m, self._truncation_voxels)
-        blocks = self._grid.compute_unique_block_coordinates(depth, intrinsics, extrinsics, *reach)
-        self._grid.integrate(blocks, depth, intrinsics, extrinsics, *reach)
-
-    def extract(self) -> o3d.t.geometry.PointCloud:
-        return self._grid.extract_point_cloud(self._weight - 0.5)
+def _integrate_depth_map(
+    grid: o3d.t.geometry.VoxelBlockGrid, depth_map: DepthMap, reach: Reach
+) -> None:
+    _integrate(grid, depth_map.camera, depth_map.T_mav_camera, reach, depth_map.depth)
 
 
 def fuse_keyframe(material: Material) -> Work:
     """Open3D: a colour and depth image into a distance field of hashed blocks."""
     image, config = material.ground_image, material.config.ground_mapping
     grid = empty_grid(config.voxel_m, FIRST_BLOCKS)
-    T_camera_ground = material.sighting.T_ground_camera.inverse()
-    motion = o3d.core.Tensor.from_numpy(T_camera_ground.matrix())
-    intrinsics = o3d.core.Tensor.from_numpy(material.ground_camera.matrix())
     reach = (1.0, config.max_depth_m, config.truncation_m / config.voxel_m)
 
     def fuse() -> None:
-        seen = np.nan_to_num(image.depth, nan=0.0)
-        depth = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(seen))
         levels = image.colour.astype(np.float32)
         colour = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(levels))
-        blocks = grid.compute_unique_block_coordinates(depth, intrinsics, motion, *reach)
-        grid.integrate(blocks, depth, colour, intrinsics, motion, *reach)
+        pose = material.sighting.T_ground_camera
+        _integrate(grid, material.ground_camera, pose, reach, image.depth, colour)
 
     return Work(fuse)
+
+
+def _integrate(
+    grid: o3d.t.geometry.VoxelBlockGrid,
+    camera: PinholeCamera,
+    T_map_camera: SE3,
+    reach: Reach,
+    depth: NDArray[np.float32],
+    colour: o3d.t.geometry.Image | None = None,
+) -> None:
+    """Integrate an image with depth [m], NaN where missing, with or without its colours."""
+    image = o3d.t.geometry.Image(o3d.core.Tensor.from_numpy(np.nan_to_num(depth, nan=0.0)))
+    intrinsics = o3d.core.Tensor.from_numpy(camera.matrix())
+    extrinsics = o3d.core.Tensor.from_numpy(T_map_camera.inverse().matrix())
+    blocks = grid.compute_unique_block_coordinates(image, intrinsics, extrinsics, *reach)
+    if colour is None:
+        grid.integrate(blocks, image, intrinsics, extrinsics, *reach)
+    else:
+        grid.integrate(blocks, image, colour, intrinsics, extrinsics, *reach)
 
 
 def extract_ground(material: Material) -> Work:
@@ -243,59 +250,47 @@ PEERS = {
     "ground_map": (
         Peer(
             "Open3D",
-            "open3d",
-            "half a pixel off, beside jumps in depth too; no image is kept to fuse anew",
             fuse_keyframe,
+            "half a pixel off, beside jumps in depth too; no image is kept to fuse anew",
         ),
     ),
     "ground_surface": (
         Peer(
             "Open3D",
-            "open3d",
-            "in no lasting order, and without a surface that lies on voxels exactly",
             extract_ground,
+            "in no lasting order, and without a surface that lies on voxels exactly",
         ),
     ),
     "add_frame": (
         Peer(
             "OpenCV, plane by plane",
-            "cv2",
-            "samples the view halved, so blurred; no gain, no record of what is covered",
             plane_by_plane,
+            "samples the view halved, so blurred; no gain, no record of what is covered",
         ),
     ),
     "distance_field": (
-        Peer(
-            "Open3D TSDF",
-            "open3d",
-            "a running mean near the surface only, no histogram",
-            integrate_one,
-        ),
+        Peer("Open3D TSDF", integrate_one, "a running mean near the surface only, no histogram"),
     ),
     "surface": (
         Peer(
             "Open3D TSDF",
-            "open3d",
-            "a running mean, no regularization; every crossing, not only what the view sees",
             integrate_and_extract,
+            "a running mean, no regularization; every crossing, not only what the view sees",
         ),
     ),
     "cost_map": (
         Peer(
             "scikit-image, masked",
-            "skimage",
-            "correlation instead of Eq. 2, over every offset with overlap, and its peak",
             masked_correlation,
+            "correlation instead of Eq. 2, over every offset with overlap, and its peak",
+            "skimage",
         ),
         Peer(
             "OpenCV, matchTemplate",
-            "cv2",
-            "correlation instead of Eq. 2; the ground map's holes count as its mean",
             match_template,
+            "correlation instead of Eq. 2; the ground map's holes count as its mean",
         ),
     ),
-    "icp": (
-        Peer("Open3D ICP", "open3d", "no trimming, and one distance for all steps", open3d_icp),
-    ),
+    "icp": (Peer("Open3D ICP", open3d_icp, "no trimming, and one distance for all steps"),),
 }
 """By the name of the row."""
