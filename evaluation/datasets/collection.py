@@ -1,11 +1,11 @@
 """Many recordings as one dataset, split by world, made in parallel and resumed where it stopped.
 
-    NAME/dataset.json    the plan: what is in it, and how it was made
+    NAME/dataset.json    the plan: contents, and how they were made
     NAME/DATASHEET.md    the same for people
-    NAME/PART/SCENE_sSEED/    recordings; PART is train or a part that was asked for
+    NAME/PART/SCENE_sSEED/    recordings; PART is train or a part of --split
 
-Until all are made the folder is called `.NAME.partial`. Recordings appear there when they are
-whole, so that whatever ends the work, the next call only makes what is missing.
+Until all are made the folder is called `.NAME.partial`. Recordings appear in it when they are
+complete: after an interruption the next call makes only what is missing.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ def make_dataset(plan: Plan, out: Path, jobs: int, threads: int) -> None:
     """Make what is missing of a dataset; nothing is made twice.
 
     Args:
-        plan: What is to be in it.
-        out: The folder to make; it appears when it is whole.
-        jobs: Recordings at a time.
-        threads: Processes that render, over all of them.
+        plan: Plan of the dataset.
+        out: Folder to make; it appears when it is complete.
+        jobs: Number of recordings made at a time.
+        threads: Number of processes that render, over all jobs.
 
     Raises:
-        InputError: The folder exists, or an unfinished one is of another plan, or in work.
-        AirgroundError: A recording cannot be made; those that are stay for the next call.
+        InputError: The folder exists, or an unfinished one has another plan, or is in use.
+        AirgroundError: A recording cannot be made; finished ones remain for the next call.
     """
     check_free(out)
     unfinished = out.parent / f".{out.name}.partial"
@@ -74,7 +74,7 @@ def make_dataset(plan: Plan, out: Path, jobs: int, threads: int) -> None:
 
 @contextmanager
 def _held(unfinished: Path) -> Iterator[None]:
-    """The folder, for this process alone."""
+    """Lock the folder for this process."""
     unfinished.mkdir(parents=True, exist_ok=True)
     with (unfinished / LOCK).open("w") as lock:
         try:
@@ -85,20 +85,20 @@ def _held(unfinished: Path) -> Iterator[None]:
 
 
 def _agree(unfinished: Path, plan: Plan) -> None:
-    """Note the plan, or see that it is the one noted; sweep away what was cut short."""
-    noted = unfinished / PLAN
-    if not noted.exists():
+    """Write the plan, or check that it is the written one; remove incomplete recordings."""
+    written = unfinished / PLAN
+    if not written.exists():
         text = json.dumps(plan.model_dump(), indent=1) + "\n"
         partial = unfinished / f"{PLAN}.partial"
         partial.write_text(text, encoding="utf-8")
-        partial.rename(noted)
-    elif read_checked(Plan, noted, "plan of a dataset") != plan:
+        partial.rename(written)
+    elif read_checked(Plan, written, "plan of a dataset") != plan:
         raise InputError(
             f"{unfinished}: is the unfinished work of another plan or version; remove it, or "
             "give the same words"
         )
-    for cut_short in unfinished.glob("*/.*.partial"):
-        shutil.rmtree(cut_short)
+    for incomplete in unfinished.glob("*/.*.partial"):
+        shutil.rmtree(incomplete)
 
 
 @dataclass(frozen=True)
@@ -110,11 +110,11 @@ class _Making:
 
 
 def _make(task: _Making) -> str | None:
-    """Record one world, in a process that does not outlive its parent; says why it cannot."""
+    """Record one world, in a process that ends with its parent; returns why it cannot."""
     end_with_parent()
     world, plan = task.world, task.plan
     out = task.folder / world.folder
-    if out.exists():  # by a worker that died before it could say so
+    if out.exists():  # by a worker that died before it returned
         return None
     try:
         record(

@@ -1,7 +1,7 @@
 """A COLMAP model in text form, of true poses and true points (colmap.github.io/format).
 
     images/mav/ images/ground/                         every tenth image
-    sparse/0/{cameras,images,points3D}.txt             as an external mapper would have left
+    sparse/0/{cameras,images,points3D}.txt             as COLMAP's mapper writes them
 
 COLMAP's pixels: the centre of the upper left one is at (0.5, 0.5). Its poses map the world
 to the camera, quaternions are w x y z.
@@ -20,7 +20,7 @@ from sim.robots.motion import ROBOTS, Robot
 
 PIXEL_CENTRE = 0.5
 MIN_VIEWS = 2
-"""A point that fewer images see is no track."""
+"""Images that a track needs at least."""
 
 
 def write_colmap_folder(folder: Path, simulated: Simulated, robots: tuple[Robot, ...]) -> None:
@@ -73,7 +73,7 @@ def _pixels_line(view: View, shown: np.ndarray) -> str:
 
 
 def _point_lines(views: Views, tracks: dict[int, list[str]]) -> list[str]:
-    """Ascending; their error is 0, for nobody measured them."""
+    """Ascending; the error is 0, since true points have none."""
     lines = []
     for point in sorted(tracks):
         place = " ".join(f"{value:.6f}" for value in views.cloud.points[point].tolist())

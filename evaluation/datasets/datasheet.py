@@ -1,4 +1,4 @@
-"""A dataset's data sheet: how it was made, from the facts themselves."""
+"""A dataset's data sheet: contents and origin, from its scenes, sensors and recordings."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from airground import __version__
-from airground.core.trajectory import Trajectory
 from airground.io.header import Header, read_header
 from airground.io.layout import HEADER, TRUTH
 from airground.io.tum import read_tum
@@ -26,10 +25,10 @@ CONVENTIONS = """\
   coordinates in frame b to frame a.
 - `world`: z up, the floor's middle is the origin. `body`: x forward, z up. `camera`: x right,
   y down, z forward. `truth/*.tum` are `T_world_body` with quaternions x y z w.
-- Integer pixel coordinates are pixel centres. Depth is z along the optical axis, 5000 a metre,
+- Integer pixel coordinates are pixel centres. Depth is z along the optical axis, 5000 per metre,
   0 is missing.
-- `mav0/` is in EuRoC's form, `ground/` in TUM's; `recording.toml` has the calibration as a user
-  is told, `truth/calibration.toml` as it is.
+- `mav0/` is in EuRoC's form, `ground/` in TUM's; `recording.toml` has the nominal calibration,
+  `truth/calibration.toml` the true one.
 
 ## Known limits
 
@@ -37,7 +36,7 @@ CONVENTIONS = """\
 - Global shutter, no lens distortion, no rolling shutter, no wind; nothing moves but the robots.
 - Depth has the noise of structured light, without interference or multipath.
 - Recordings of one scene share its room, its paths (moved a little by the seed) and its light;
-  a test part of the same scenes says nothing of other scenes.
+  results on a test part of the same scenes do not hold for other scenes.
 - All randomness comes from the seed: the same version makes the same bytes.
 """
 
@@ -51,9 +50,9 @@ def datasheet(
     """The text of `DATASHEET.md`.
 
     Args:
-        name: Of the dataset.
-        scenes: All that are in it.
-        sensors: How good the sensors are.
+        name: Name of the dataset.
+        scenes: All scenes in it.
+        sensors: Quality of the sensors.
         recordings: Part and folder of each recording.
     """
     headers = [(part, folder, read_header(folder / HEADER)) for part, folder in recordings]
@@ -91,13 +90,8 @@ def _parts(headers: Sequence[Recorded]) -> list[str]:
         for part, of in sorted(parts.items())
     ]
     columns = ["part", "recordings", "seconds", "MAV images", "ground images"]
-    return [
-        "## Parts",
-        "",
-        "No world (scene and seed) is in two parts.",
-        "",
-        *_table(columns, rows),
-    ]
+    rule = "No world (scene and seed) is in two parts."
+    return ["## Parts", "", rule, "", *_table(columns, rows)]
 
 
 def _scenes(scenes: Sequence[Scene]) -> list[str]:
@@ -151,15 +145,11 @@ def _noise(sensors: SensorPreset) -> list[str]:
 def _recordings(headers: Sequence[Recorded]) -> list[str]:
     rows = []
     for part, folder, header in headers:
-        paths = [_path(read_tum(folder / TRUTH / f"{robot}.tum")) for robot in ROBOTS]
-        rows.append([f"{part}/{folder.name}", header.scene, header.seed, f"{header.duration_s:g}"])
-        rows[-1] += paths
+        paths_m = [read_tum(folder / TRUTH / f"{robot}.tum").path_m() for robot in ROBOTS]
+        row = [f"{part}/{folder.name}", header.scene, header.seed, f"{header.duration_s:g}"]
+        rows.append([*row, *(f"{path_m:.1f}" for path_m in paths_m)])
     columns = ["recording", "scene", "seed", "seconds", "MAV path [m]", "ground path [m]"]
     return ["## Recordings", "", *_table(columns, rows)]
-
-
-def _path(trajectory: Trajectory) -> str:
-    return f"{trajectory.path_m():.1f}"
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> list[str]:

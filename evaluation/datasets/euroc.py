@@ -4,7 +4,7 @@ mav0/body.yaml
 mav0/cam0/ imu0/                     as recorded; the body of T_BS is the IMU
 mav0/state_groundtruth_estimate0/    the IMU in the world at 200 Hz, its velocity and biases
 mav0/pointcloud0/                    the true surface, as in EuRoC's Vicon rooms
-mav0/mag0/                           in the same form, though EuRoC had no magnetometer
+mav0/mag0/                           in the same form; EuRoC has no magnetometer
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from airground.io import layout
 from airground.io.euroc import sensor_yaml
 from airground.io.ply import write_ply
 from evaluation.datasets.simulated import Simulated, copy_images
-from evaluation.datasets.true_points import sample_surface
+from evaluation.datasets.views import sample_surface
 from sim.robots.motion import RATE_HZ, Robot
 
 YAML_START = "%YAML:1.0\n"
-"""EuRoC's files begin so; OpenCV's reader insists on it."""
+"""First line of EuRoC's files, which OpenCV's reader requires."""
 STATE_COLUMNS = (
     "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], "
     "q_RS_z [], v_RS_R_x [m s^-1], v_RS_R_y [m s^-1], v_RS_R_z [m s^-1], "
@@ -34,7 +34,7 @@ STATE_COLUMNS = (
     "b_a_RS_S_x [m s^-2], b_a_RS_S_y [m s^-2], b_a_RS_S_z [m s^-2]"
 )
 BIAS_WINDOW_S = 1.0
-"""Biases are what the samples are off the truth, averaged by a Gaussian this wide [s]."""
+"""Standard deviation of the Gaussian that averages a sample's errors to its bias [s]."""
 SURFACE_POINTS = 200_000
 
 
@@ -61,7 +61,7 @@ def write_euroc_folder(folder: Path, simulated: Simulated, robots: tuple[Robot, 
 
 
 def true_imu(simulated: Simulated, robot: Robot) -> tuple[Trajectory, NDArray[np.float64]]:
-    """Of the IMU at 200 Hz: `T_world_imu`, and velocity in the world (N, 3) [m/s]."""
+    """The IMU at 200 Hz: `T_world_imu`, and its velocity in the world (N, 3) [m/s]."""
     motion = simulated.motion(robot)
     T_body_imu = motion.mounting.T_body_imu
     arm = T_body_imu.translation
@@ -87,18 +87,17 @@ def _write_states(path: Path, simulated: Simulated) -> None:
 
 
 def _biases(simulated: Simulated) -> NDArray[np.float64]:
-    """(N, 6) of gyro [rad/s] and accelerometer [m/s^2].
+    """(N, 6) biases of gyro [rad/s] and accelerometer [m/s^2].
 
-    A recording does not keep what its simulator drew. As EuRoC's own these are estimates,
-    but made with the truth: what is left of the white noise is its density over
+    A recording does not hold the biases that its simulator drew. These are estimates, as EuRoC's
+    are, but from the truth: white noise remains with its density over
     sqrt(2 sqrt(pi) BIAS_WINDOW_S).
     """
     samples, _ = simulated.samples("mav")
     motion = simulated.motion("mav")
-    off = np.hstack([samples.gyro - motion.gyro_imu, samples.accelerometer]) - np.hstack(
-        [np.zeros_like(motion.gyro_imu), motion.specific_force_imu]
-    )
-    return gaussian_filter1d(off, BIAS_WINDOW_S * RATE_HZ, axis=0, mode="nearest")
+    measured = np.hstack([samples.gyro, samples.accelerometer])
+    errors = measured - np.hstack([motion.gyro_imu, motion.specific_force_imu])
+    return gaussian_filter1d(errors, BIAS_WINDOW_S * RATE_HZ, axis=0, mode="nearest")
 
 
 def _write_yaml(path: Path, text: str) -> None:

@@ -23,13 +23,13 @@ Robots = tuple[Robot, ...]
 
 @dataclass(frozen=True)
 class Format:
-    """A way to hand a recording on.
+    """A format that recordings are exported to.
 
     Attributes:
-        write: Fills an empty folder with what these robots sensed.
-        usual: Whom it takes where nobody says.
-        possible: What it can hold.
-        because: Why it holds nothing else.
+        write: Fills an empty folder with the data of these robots.
+        usual: Robots that it holds by default.
+        possible: Robots that it can hold.
+        because: Reason why it holds no others.
     """
 
     write: Callable[[Path, Simulated, Robots], None]
@@ -55,20 +55,19 @@ FORMATS = {
 }
 
 
-def robots_for(name: str, wanted: str | None) -> Robots:
+def robots_for(name: str, asked: str | None) -> Robots:
     """The robots that go into a format.
 
     Args:
-        name: Of the format.
-        wanted: "mav", "ground" or "both"; None for the usual.
+        name: Name of the format.
+        asked: "mav", "ground" or "both"; None for the format's default.
 
     Raises:
         InputError: The format cannot hold them.
     """
     chosen = FORMATS[name]
-    asked: dict[str | None, Robots] = {None: chosen.usual, "both": ROBOTS}
-    asked |= {robot: (robot,) for robot in ROBOTS}
-    robots = asked[wanted]
+    by_word = {None: chosen.usual, "both": ROBOTS, "mav": MAV, "ground": GROUND}
+    robots = by_word[asked]
     if robots not in chosen.possible:
-        raise InputError(f"--robot {wanted}: not with --format {name}: {chosen.because}")
+        raise InputError(f"--robot {asked}: not with --format {name}: {chosen.because}")
     return robots

@@ -3,12 +3,12 @@
 recording/recording.mcap    messages in order of time
 recording/metadata.yaml     what rosbag2 keeps beside it
 
-/ROBOT/camera/image_raw/compressed  PNG          /ROBOT/camera/camera_info    as told
+/ROBOT/camera/image_raw/compressed  PNG          /ROBOT/camera/camera_info    nominal
 /ROBOT/camera/depth                 32FC1 [m]    /ROBOT/imu  /ROBOT/magnetic_field
-/tf_static    base_link to imu to camera_optical, as told
+/tf_static    base_link to imu to camera_optical, nominal
 /tf           world to base_link: the truth
 /ROBOT/truth/odometry               of base_link, at 200 Hz
-/ROBOT/truth/camera                 of camera_optical, when each image was really taken
+/ROBOT/truth/camera                 of camera_optical, at the true time of each image
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ LATCHED = Qos(
     liveliness_lease_duration=_FOREVER,
     avoid_ros_namespace_conventions=False,
 )
-"""Who listens to /tf_static later gets it, too."""
+"""Subscribers that join later receive /tf_static too."""
 
 
 def write_bag(folder: Path, simulated: Simulated, robots: tuple[Robot, ...]) -> None:
@@ -73,7 +73,7 @@ def write_bag(folder: Path, simulated: Simulated, robots: tuple[Robot, ...]) -> 
 
 
 def _messages(simulated: Simulated, robots: tuple[Robot, ...]) -> Iterator[Message]:
-    """All of them, in order of time."""
+    """All messages, in order of time."""
     yield 0, "/tf_static", ros.transforms(0, _mountings(simulated, robots))
     streams = [
         stream(simulated, robot)
@@ -86,7 +86,7 @@ def _messages(simulated: Simulated, robots: tuple[Robot, ...]) -> Iterator[Messa
 def _mountings(simulated: Simulated, robots: tuple[Robot, ...]) -> list[tuple[str, str, SE3]]:
     edges = []
     for robot in robots:
-        T_body_imu = SE3.from_matrix(simulated.told(robot).T_body_imu)
+        T_body_imu = SE3.from_matrix(simulated.nominal(robot).T_body_imu)
         edges.append((f"{robot}/{BODY}", f"{robot}/{IMU}", T_body_imu))
         edges.append((f"{robot}/{IMU}", f"{robot}/{CAMERA}", simulated.T_imu_camera(robot)))
     return edges
@@ -104,7 +104,7 @@ def _truth(simulated: Simulated, robot: Robot) -> Iterator[Message]:
 
 def _imu(simulated: Simulated, robot: Robot) -> Iterator[Message]:
     samples, _ = simulated.samples(robot)
-    table = simulated.told(robot).imu
+    table = simulated.nominal(robot).imu
     values = zip(samples.gyro, samples.accelerometer, strict=True)
     for stamp, (gyro, accelerometer) in zip(samples.stamps_ns.tolist(), values, strict=True):
         message = ros.imu(stamp, f"{robot}/{IMU}", gyro, accelerometer, table)
@@ -113,14 +113,14 @@ def _imu(simulated: Simulated, robot: Robot) -> Iterator[Message]:
 
 def _magnetic(simulated: Simulated, robot: Robot) -> Iterator[Message]:
     _, samples = simulated.samples(robot)
-    table = simulated.told(robot).magnetometer
+    table = simulated.nominal(robot).magnetometer
     for stamp, field in zip(samples.stamps_ns.tolist(), samples.field, strict=True):
         message = ros.magnetic_field(stamp, f"{robot}/{IMU}", field, table)
         yield stamp, f"/{robot}/magnetic_field", message
 
 
 def _images(simulated: Simulated, robot: Robot) -> Iterator[Message]:
-    camera, frame = simulated.told(robot).camera.pinhole(), f"{robot}/{CAMERA}"
+    camera, frame = simulated.nominal(robot).camera.pinhole(), f"{robot}/{CAMERA}"
     files, topic = simulated.image_files(robot), f"/{robot}/camera"
     for index, stamp in enumerate(simulated.stamps_ns(robot)):
         yield stamp, f"{topic}/camera_info", ros.camera_info(stamp, frame, camera)

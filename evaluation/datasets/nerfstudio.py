@@ -1,11 +1,11 @@
-"""One robot's images for Nerfstudio and those who read its `transforms.json`.
+"""One robot's images for Nerfstudio and other readers of its `transforms.json`.
 
     transforms.json    true intrinsics and true poses, camera to world, in OpenGL's axes
     images/            every tenth image
     depths/            the ground robot's measured depth, 16 bit, millimetres, 0 is missing
-    points.ply         true points in the images' colours, to begin splats from
+    points.ply         true points in the images' colours, as a start for splats
 
-OpenGL's camera looks along -z with y up. Nerfstudio takes pixel centres to be at halves.
+OpenGL's camera looks along -z with y up. In Nerfstudio pixel centres are at halves.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def write_nerfstudio_folder(folder: Path, simulated: Simulated, robots: tuple[Ro
 
 
 def _intrinsics(camera: PinholeCamera) -> dict[str, Any]:
-    """OPENCV with no distortion: the one model that all readers of this file know."""
+    """OPENCV without distortion: the one model that all readers of this file know."""
     return {
         "camera_model": "OPENCV",
         "w": camera.width,

@@ -1,4 +1,4 @@
-"""What is to be in a dataset of many recordings, and which part each belongs to."""
+"""The plan of a dataset of many recordings: its worlds, and the part that each belongs to."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ from sim.sensors.presets import sensor_preset
 PLAN = "dataset.json"
 """The plan's file in the dataset."""
 REST = "train"
+"""The part of all worlds that no share takes."""
 MAX_SEEDS = 100_000
+"""Seeds in one range: more are a typing error."""
 
 
 class World(BaseModel):
@@ -24,10 +26,10 @@ class World(BaseModel):
 
     Attributes:
         scene: Name or file of the scene.
-        name: Its name.
-        digest: SHA-256 of what the scene's file says.
-        seed: Of the heap, the flight and the noise.
-        part: Of the dataset.
+        name: Name of the scene.
+        digest: SHA-256 of the scene's contents.
+        seed: Seed of the heap, the flight and the noise.
+        part: Part of the dataset.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -39,17 +41,17 @@ class World(BaseModel):
 
     @property
     def folder(self) -> str:
-        """In the dataset."""
+        """Its folder in the dataset."""
         return f"{self.part}/{self.name}_s{self.seed}"
 
 
 class Plan(BaseModel):
-    """All that decides what is in a dataset.
+    """All that determines the contents of a dataset.
 
     Attributes:
-        airground: The version that makes it.
+        airground: Version of this program.
         sensors: Name of the sensor preset.
-        duration_s: Of each recording; the scenes' own if None.
+        duration_s: Duration of each recording [s]; the scenes' own if None.
         worlds: The recordings.
     """
 
@@ -82,7 +84,7 @@ def parse_split(texts: Sequence[str]) -> dict[str, float]:
     """Shares by the name of the part, from texts such as "test=0.2"; the rest is "train".
 
     Raises:
-        InputError: A name or a share cannot be.
+        InputError: A name or a share is not valid.
     """
     shares: dict[str, float] = {}
     for text in texts:
@@ -105,7 +107,7 @@ def plan_dataset(
     sensors: str,
     duration_s: float | None,
 ) -> Plan:
-    """Every scene with every seed; each world is in one part only.
+    """Plan every scene with every seed; each world is in one part only.
 
     Raises:
         InputError: A scene or the sensors are unknown, or two scenes have the same name.
@@ -115,25 +117,18 @@ def plan_dataset(
     names = [scene.name for scene in loaded.values()]
     if len(set(names)) < len(scenes):
         raise InputError(f"two scenes have the same name: {', '.join(sorted(names))}")
-    worlds = [(scene, seed) for scene in scenes for seed in seeds]
-    # A generator of its own: another sensor preset shall not move worlds to another part.
-    order = np.random.default_rng(0).permutation(len(worlds)).tolist()
-    parts = [REST] * len(worlds)
+    pairs = [(scene, seed) for scene in scenes for seed in seeds]
+    # A generator of its own, so that another sensor preset does not move worlds between parts.
+    order = np.random.default_rng(0).permutation(len(pairs)).tolist()
+    parts = [REST] * len(pairs)
     for part, share in shares.items():
-        taken, order = order[: round(share * len(worlds))], order[round(share * len(worlds)) :]
+        count = round(share * len(pairs))
+        taken, order = order[:count], order[count:]
         for index in taken:
             parts[index] = part
-    return Plan(
-        sensors=sensors,
-        duration_s=duration_s,
-        worlds=tuple(
-            World(
-                scene=scene,
-                name=loaded[scene].name,
-                digest=bytes_digest(loaded[scene].model_dump_json().encode()),
-                seed=seed,
-                part=part,
-            )
-            for (scene, seed), part in zip(worlds, parts, strict=True)
-        ),
+    digests = {scene: bytes_digest(one.model_dump_json().encode()) for scene, one in loaded.items()}
+    worlds = tuple(
+        World(scene=scene, name=loaded[scene].name, digest=digests[scene], seed=seed, part=part)
+        for (scene, seed), part in zip(pairs, parts, strict=True)
     )
+    return Plan(sensors=sensors, duration_s=duration_s, worlds=worlds)

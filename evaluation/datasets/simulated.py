@@ -1,4 +1,4 @@
-"""A recording of ours with its truth, as what is handed out is made from."""
+"""A simulated recording with its truth: the source of every exported format."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from airground.core.messages import ImuSamples, MagneticSamples
 from airground.core.se3 import SE3
-from airground.core.trajectory import Trajectory
 from airground.errors import InputError
 from airground.io.calibration import RobotTable
 from airground.io.image_files import ImageFiles
@@ -23,12 +23,12 @@ from sim.robots.robot_motion import RobotMotion
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """What both robots sensed, and what was true.
+    """What both robots sensed, and the truth.
 
     Attributes:
-        recording: As the pipeline reads it.
-        truth: What really was.
-        files: Where the images lie.
+        recording: The recording as the pipeline reads it.
+        truth: Its truth.
+        files: Files of its images.
     """
 
     recording: Recording
@@ -40,7 +40,7 @@ class Simulated:
         """Open a recording, and compare its files with their digests.
 
         Raises:
-            InputError: It is none of ours, is damaged, or has no truth.
+            InputError: It is no recording of simulate, is damaged, or has no truth.
         """
         if path.is_dir() and not (path / HEADER).exists():
             raise InputError(
@@ -52,42 +52,37 @@ class Simulated:
         assert isinstance(recording.images, ImageFiles)
         return cls(recording, Truth.open(path), recording.images)
 
-    def told(self, robot: Robot) -> RobotTable:
-        """The calibration that a user of the sensors is told."""
+    def sensed(self, robot: Robot) -> RobotRecording[Any]:
+        """One robot's part of the recording."""
+        return self.recording.mav if robot == "mav" else self.recording.ground
+
+    def nominal(self, robot: Robot) -> RobotTable:
+        """The nominal calibration, which the pipeline uses."""
         calibration = self.recording.header.calibration
         return calibration.mav if robot == "mav" else calibration.ground
 
     def motion(self, robot: Robot) -> RobotMotion:
-        """What the robot really did."""
+        """The robot's true motion."""
         return self.truth.motion.robot(robot)
 
     def stamps_ns(self, robot: Robot) -> list[int]:
-        """Of the robot's images."""
-        return self._sensed(robot).camera_stamps.tolist()
-
-    def _sensed(self, robot: Robot) -> RobotRecording:
-        return self.recording.mav if robot == "mav" else self.recording.ground
+        """Stamps of the robot's images [ns]."""
+        return self.sensed(robot).camera_stamps.tolist()
 
     def image_files(self, robot: Robot) -> Sequence[Path]:
-        """Of the robot's camera, grey or colour, in order of time."""
+        """Files of the robot's grey or colour images, in order of time."""
         return self.files.mav_files if robot == "mav" else self.files.ground_colour_files
 
     def samples(self, robot: Robot) -> tuple[ImuSamples, MagneticSamples]:
-        """What the robot's IMU and magnetometer measured."""
-        sensed = self._sensed(robot)
+        """All samples of the robot's IMU and magnetometer."""
+        sensed = self.sensed(robot)
         assert sensed.imu is not None
         assert sensed.magnetic is not None
         return sensed.imu, sensed.magnetic
 
-    def true_cameras(self, robot: Robot) -> Trajectory:
-        """`T_world_camera` of every image, by the stamps that the images bear."""
-        stamps = self.stamps_ns(robot)
-        poses = [self.truth.T_world_camera(robot, stamp) for stamp in stamps]
-        return Trajectory.from_poses(stamps, poses)
-
     def T_imu_camera(self, robot: Robot) -> SE3:
-        """As told."""
-        return SE3.from_matrix(self.told(robot).T_imu_camera)
+        """Nominal pose of the camera."""
+        return SE3.from_matrix(self.nominal(robot).T_imu_camera)
 
 
 def copy_images(files: Sequence[Path], folder: Path) -> None:

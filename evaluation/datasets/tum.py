@@ -4,8 +4,8 @@ rgb.txt depth.txt rgb/ depth/    16-bit depth, 5000 a metre, 0 is missing
 associations.txt                 colour and depth in pairs, as their associate.py writes
 accelerometer.txt                in a Kinect's axes
 groundtruth.txt                  the colour camera in the world, at the stamp of each image
-calibration.yaml imu0/ mag0/     which TUM's own folders lack: the calibration that the
-                                 robot is told, its gyro and its magnetometer
+calibration.yaml imu0/ mag0/     which TUM's own folders lack: the nominal calibration, the
+                                 gyro and the magnetometer
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import shutil
 from pathlib import Path
 
 from airground.core.messages import ImuSamples
+from airground.core.trajectory import Trajectory
 from airground.errors import InputError
 from airground.io import layout
 from airground.io.euroc import camera_yaml
@@ -31,11 +32,11 @@ SAME_FILES = (
     layout.GROUND_MAGNETOMETER_DATA,
     f"{layout.GROUND_MAGNETOMETER}/sensor.yaml",
 )
-"""A recording has these in TUM's and EuRoC's form already."""
+"""Files that a recording has in TUM's and EuRoC's form already."""
 
 
 def write_tum_folder(folder: Path, simulated: Simulated, robots: tuple[Robot, ...]) -> None:
-    """Fill an empty folder with what the ground robot sensed.
+    """Fill an empty folder with the ground robot's data.
 
     Raises:
         InputError: The depth images have another unit than TUM's.
@@ -55,13 +56,15 @@ def write_tum_folder(folder: Path, simulated: Simulated, robots: tuple[Robot, ..
         shutil.copyfile(recording.path / name, target)
     write_accelerometer(folder / "accelerometer.txt", _of_a_kinect(simulated))
     T_imu_camera = simulated.T_imu_camera("ground")
-    yaml = camera_yaml(simulated.told("ground").camera, T_imu_camera)
+    yaml = camera_yaml(simulated.nominal("ground").camera, T_imu_camera)
     (folder / "calibration.yaml").write_text(yaml, encoding="utf-8")
-    write_tum(folder / "groundtruth.txt", simulated.true_cameras("ground"))
+    stamps_ns = simulated.stamps_ns("ground")
+    poses = [simulated.truth.T_world_camera("ground", stamp_ns) for stamp_ns in stamps_ns]
+    write_tum(folder / "groundtruth.txt", Trajectory.from_poses(stamps_ns, poses))
 
 
 def _of_a_kinect(simulated: Simulated) -> ImuSamples:
-    """The accelerometer's samples in the axes that a Kinect's has."""
+    """The accelerometer's samples in a Kinect's axes."""
     samples, _ = simulated.samples("ground")
     in_camera = samples.accelerometer @ simulated.T_imu_camera("ground").rotation
     return ImuSamples(samples.stamps_ns, samples.gyro, in_camera * ACCELEROMETER_AXES)

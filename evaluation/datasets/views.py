@@ -1,4 +1,4 @@
-"""Images chosen from a recording, posed by the truth, with true points in their colours."""
+"""Images chosen from a recording, with true poses, and points of the true surface in them."""
 
 from __future__ import annotations
 
@@ -6,17 +6,37 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import open3d as o3d
+from numpy.typing import NDArray
 
 from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
+from airground.core.messages import GroundImage
 from airground.core.se3 import SE3
 from evaluation.datasets.simulated import Simulated
-from evaluation.datasets.true_points import Seen, colours_at, sample_surface, seen_by
+from sim.recording.truth import Truth
 from sim.robots.motion import Robot
 
 EVERY = 10
-"""Of all images every tenth: three a second. Who reconstructs from images wants no more."""
+"""Every tenth image is chosen: three per second, as many as reconstruction from images needs."""
 POINTS = 20_000
+GREY = 128
+"""Colour of points that no image shows."""
+NEAR = 1e-3
+"""A ray that ends this share of its length before a point hit the point's own surface."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Points in one image.
+
+    Attributes:
+        indices: (M,) indices of the points.
+        pixels: (M, 2) pixels (x, y); integer coordinates are pixel centres.
+    """
+
+    indices: NDArray[np.int64]
+    pixels: NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,18 +44,16 @@ class View:
     """One image with its true pose.
 
     Attributes:
-        robot: Whose.
-        index: Of the image among all of that robot's.
-        file: Where it lies in the recording.
-        camera: True intrinsics.
+        robot: The robot that took it.
+        index: Index among all images of that robot.
+        file: Its file in the recording.
         T_world_camera: True pose.
-        seen: Which true points are in it.
+        seen: True points in it.
     """
 
     robot: Robot
     index: int
     file: Path
-    camera: PinholeCamera
     T_world_camera: SE3
     seen: Seen
 
@@ -52,8 +70,8 @@ class Views:
     views: list[View]
     cloud: PointCloud
 
-    def times_seen(self) -> np.ndarray:
-        """(N,) in how many images each point is."""
+    def times_seen(self) -> NDArray[np.int64]:
+        """(N,) number of images that each point is in."""
         indices = [view.seen.indices for view in self.views]
         return np.bincount(np.concatenate(indices), minlength=len(self.cloud))
 
@@ -68,20 +86,56 @@ def choose_views(simulated: Simulated, robots: tuple[Robot, ...]) -> Views:
     views = []
     for robot in robots:
         camera = truth.camera(robot)
-        for index in range(0, len(simulated.stamps_ns(robot)), EVERY):
-            T_world_camera = truth.T_world_camera(robot, simulated.stamps_ns(robot)[index])
-            seen = seen_by(truth, camera, T_world_camera, points)
+        for index, stamp_ns in list(enumerate(simulated.stamps_ns(robot)))[::EVERY]:
+            T_world_camera = truth.T_world_camera(robot, stamp_ns)
+            seen = _seen_by(truth, camera, T_world_camera, points)
             new = ~coloured[seen.indices]
             if new.any():
-                image = _image(simulated, robot, index)
-                colours[seen.indices[new]] = colours_at(image, seen.pixels[new])
+                image = simulated.sensed(robot).read_image(index)
+                pixels = image.colour if isinstance(image, GroundImage) else image.image
+                colours[seen.indices[new]] = _colours_at(pixels, seen.pixels[new])
                 coloured[seen.indices] = True
             file = simulated.image_files(robot)[index]
-            views.append(View(robot, index, file, camera, T_world_camera, seen))
+            views.append(View(robot, index, file, T_world_camera, seen))
     return Views(views, PointCloud(surface.points, colours))
 
 
-def _image(simulated: Simulated, robot: Robot, index: int) -> np.ndarray:
-    if robot == "mav":
-        return simulated.recording.mav.read_image(index).image
-    return simulated.recording.ground.read_image(index).colour
+def sample_surface(truth: Truth, count: int) -> PointCloud:
+    """Points spread evenly over the true surface, in the world; the same in every call."""
+    mesh = o3d.io.read_triangle_mesh(truth.folder / "surface.ply")
+    corners = np.asarray(mesh.vertices)[np.asarray(mesh.triangles)]
+    areas = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    rng = np.random.default_rng(0)
+    chosen = corners[rng.choice(len(corners), count, p=areas / areas.sum())]
+    # The square root spreads them evenly over a triangle.
+    far, along = np.sqrt(rng.random(count))[:, None], rng.random(count)[:, None]
+    points = (
+        (1 - far) * chosen[:, 0] + far * (1 - along) * chosen[:, 1] + far * along * chosen[:, 2]
+    )
+    return PointCloud(points.astype(np.float32), np.full((count, 3), GREY, np.uint8))
+
+
+def _seen_by(
+    truth: Truth, camera: PinholeCamera, T_world_camera: SE3, points_world: NDArray
+) -> Seen:
+    """The points (N, 3) of the surface that lie in the image and are not hidden."""
+    pixels = camera.project(T_world_camera.inverse() @ points_world)
+    x, y = pixels.T
+    with np.errstate(invalid="ignore"):
+        inside = (x > -0.5) & (x < camera.width - 0.5) & (y > -0.5) & (y < camera.height - 0.5)
+    indices = np.flatnonzero(inside)
+    origin = T_world_camera.translation
+    rays = np.empty((len(indices), 6), np.float32)
+    rays[:, :3], rays[:, 3:] = origin, points_world[indices] - origin
+    hits = truth.surface.cast_rays(o3d.core.Tensor.from_numpy(rays))["t_hit"].numpy()
+    clear = hits >= 1 - NEAR
+    return Seen(indices[clear], pixels[indices[clear]])
+
+
+def _colours_at(image: NDArray[np.uint8], pixels: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """(M, 3) RGB of the nearest pixels of a grey (H, W) or colour (H, W, 3) image."""
+    x, y = np.rint(pixels).astype(int).T
+    colours = image[y, x]
+    return colours if colours.ndim == 2 else np.repeat(colours[:, None], 3, axis=1)

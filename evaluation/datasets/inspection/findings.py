@@ -1,4 +1,4 @@
-"""Findings of an inspection, and how regularly a sensor speaks."""
+"""Findings of an inspection: what they look like, and those on streams of stamps."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rich.table import Table
 
 
 class Verdict(StrEnum):
-    """What a finding means."""
+    """Meaning of a finding."""
 
     FINE = "ok"
     NOTED = "note"
@@ -26,9 +26,9 @@ class Finding:
     """One line of the table.
 
     Attributes:
-        part: Of the dataset: "mav", "ground", or "" for all of it.
-        subject: What was looked at.
-        found: In words and numbers.
+        part: Part of the dataset: "mav", "ground", or "" for all of it.
+        subject: What was inspected.
+        found: What was found, in words and numbers.
         verdict: What that means.
     """
 
@@ -51,7 +51,7 @@ def show(title: str, findings: Sequence[Finding], console: Console | None = None
 
 
 def as_json(dataset: str, layout: str, findings: Sequence[Finding]) -> str:
-    """The same for programs."""
+    """Findings as JSON."""
     content = {
         "schema": "airground-inspection",
         "version": 1,
@@ -64,19 +64,19 @@ def as_json(dataset: str, layout: str, findings: Sequence[Finding]) -> str:
 
 
 MISSED = 1.5
-"""A step this many times the usual one leaves something out."""
+"""Steps between stamps longer than this many median steps leave samples out."""
 LONGEST_GAP_S = {"images": 0.5, "IMU": 0.05, "magnetometer": 0.5, "true poses": 0.5}
-"""Over longer gaps nobody can tell what happened."""
+"""Gaps too long to be bridged by interpolation or integration [s]."""
 
 
 @dataclass(frozen=True)
 class Rhythm:
-    """Of one stream of stamps.
+    """Regularity of one stream of stamps.
 
     Attributes:
-        count: How many there are.
-        rate_hz: By the median step.
-        missing: How many more there would be at that rate.
+        count: Number of stamps.
+        rate_hz: Rate by the median step.
+        missing: Number of samples left out at that rate.
         longest_gap_s: The longest step.
         jitter_ms: Standard deviation of the steps that leave nothing out.
     """
@@ -91,12 +91,12 @@ class Rhythm:
     def of(cls, stamps_ns: NDArray[np.int64]) -> Rhythm:
         """From at least two stamps [ns]."""
         steps_s = np.diff(stamps_ns) / 1e9
-        usual = float(np.median(steps_s))
-        whole = steps_s < MISSED * usual
-        left_out = np.rint(steps_s[~whole] / usual) - 1
+        usual_s = float(np.median(steps_s))
+        whole = steps_s < MISSED * usual_s
+        left_out = np.rint(steps_s[~whole] / usual_s) - 1
         return cls(
             len(stamps_ns),
-            1 / usual,
+            1 / usual_s,
             int(left_out.sum()),
             float(steps_s.max()),
             float(1e3 * steps_s[whole].std()),

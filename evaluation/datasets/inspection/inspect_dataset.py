@@ -1,4 +1,4 @@
-"""Looks at a dataset: recordings of ours, a plain EuRoC or a plain TUM RGB-D folder."""
+"""Inspection of a dataset: simulated recordings, a plain EuRoC or a plain TUM RGB-D folder."""
 
 from __future__ import annotations
 
@@ -25,21 +25,25 @@ from evaluation.setup.checked_json import read_checked
 from evaluation.table.true_camera import true_camera
 
 FIELD_OF_VIEW_DEG = (20.0, 150.0)
+"""Horizontal; beyond it the focal length is probably in another unit."""
 MIN_DEPTH = 0.05
+"""Share of pixels with depth; below it depth images are probably misread."""
 DEPTH_SAMPLES = 10
+"""Images in which depth is inspected, spread evenly."""
 
 
 def inspect_dataset(path: Path, calibration_file: Path | None = None) -> tuple[str, list[Finding]]:
-    """Its layout ("airground", "dataset" of many, "euroc" or "tum"), and what is in it.
-
-    What keeps a dataset from being read at all is a finding, too.
+    """Inspect a dataset; what keeps it from being read is a finding, too.
 
     Args:
         path: The folder.
         calibration_file: Camera calibration of a plain folder.
 
+    Returns:
+        Its layout ("airground", "dataset" of many, "euroc" or "tum"), and the findings.
+
     Raises:
-        InputError: The folder is of no kind that can be looked at.
+        InputError: The folder has no known layout.
     """
     if not path.is_dir():
         raise InputError(f"{path}: no such folder")
@@ -58,7 +62,7 @@ def inspect_dataset(path: Path, calibration_file: Path | None = None) -> tuple[s
 
 
 def _many(path: Path) -> list[Finding]:
-    """What is in each recording of a dataset, and whether all that were planned are there."""
+    """Findings of each recording of a dataset, and whether all planned ones exist."""
     plan = read_checked(Plan, path / PLAN, "plan of a dataset")
     planned = {world.folder for world in plan.worlds}
     there = {str(file.parent.relative_to(path)) for file in path.glob(f"*/*/{HEADER}")}
@@ -126,7 +130,7 @@ def _samples(part: str, recording: RobotRecording) -> list[Finding]:
 
 
 def _camera(part: str, recording: RobotRecording) -> Finding:
-    """Without distortion: that is taken out as images are read."""
+    """Without distortion, which is removed when images are read."""
     camera = recording.calibration.camera
     view_deg = float(np.rad2deg(2 * np.arctan(camera.width / 2 / camera.fx)))
     found = f"{camera.width}x{camera.height}, f {camera.fx:.1f} px, {view_deg:.0f} deg wide"
@@ -136,7 +140,7 @@ def _camera(part: str, recording: RobotRecording) -> Finding:
 
 
 def _depth(part: str, recording: RobotRecording) -> Finding:
-    """Of a few images."""
+    """Depth in a few images."""
     last = len(recording.camera_stamps) - 1
     known, middle = [], []
     for index in np.unique(np.linspace(0, last, DEPTH_SAMPLES).astype(int)):

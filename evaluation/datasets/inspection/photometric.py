@@ -1,9 +1,9 @@
-"""Do the true poses fit the images? Images are warped into later ones, and compared.
+"""Fit of true poses to images: images are warped into later ones, and compared.
 
-An image is carried by its depth and the true poses into another one. If pose, depth,
-calibration and stamps all fit, nothing looks more alike than what the truth carries there;
-with poses turned so that everything lands two pixels beside, it looks less alike. Where the
-parabola through these three errors is lowest tells how many pixels the truth is off.
+An image is warped into another one by its depth and the true poses. If pose, depth, calibration
+and stamps are right, their difference is lowest there, and higher with poses turned so that
+everything lies two pixels beside. The minimum of the parabola through these three errors is
+the error of the truth in pixels.
 """
 
 from __future__ import annotations
@@ -21,30 +21,30 @@ from airground.core.se3 import SE3
 
 SHIFT_PX = 2.0
 SMOOTHING_PX = 1.5
-"""Wide enough that the error falls towards the truth from two pixels away."""
+"""Wide enough that the difference falls towards the truth from two pixels away."""
 COARSE_PX = np.arange(-24.0, 25.0, 6.0)
 COARSE_SMOOTHING_PX = 6.0
 """Of the search that comes first; beyond it an offset is only known to be large."""
 BESIDE = ((-SHIFT_PX, 0.0), (SHIFT_PX, 0.0), (0.0, -SHIFT_PX), (0.0, SHIFT_PX))
 MAX_STEPS = 20
 EDGES = 0.2
-"""Only this share of the pixels is compared: those at the strongest edges."""
+"""Share of the pixels that are compared: those at the strongest edges."""
 MAX_PIXELS = 10_000
 MIN_PIXELS = 500
 MIN_SHARED = 0.2
-"""Of what one image shows so much is in the other, or the pose is no pose of this camera."""
+"""Share of one image that the other shows; with less, the pose is not that of this camera."""
 MIN_MOTION_PX = 4.0
-"""Between two images a pixel moves this far at least, or any pose would fit."""
+"""Least median motion of pixels between two images: with less, any pose would fit."""
 
 
 @dataclass(frozen=True)
 class Posed:
-    """An image and where its camera truly was.
+    """An image and the true pose of its camera.
 
     Attributes:
-        grey: (H, W) uint8.
-        depth: (H, W) [m], NaN where unknown.
-        T_world_camera: The true pose.
+        grey: (H, W) uint8 image.
+        depth: (H, W) float32 depth [m], NaN where unknown.
+        T_world_camera: True pose.
     """
 
     grey: NDArray[np.uint8]
@@ -54,12 +54,12 @@ class Posed:
 
 @dataclass(frozen=True)
 class Fit:
-    """How well one image fits another.
+    """Fit of one image to another.
 
     Attributes:
-        offset_px: (2,) how far the truth is off in x and y; infinite where it carries the one
+        offset_px: (2,) error of the truth in x and y; infinite where it maps most of the one
             image out of the other.
-        rise: Mean error two pixels beside the best place over that of the best.
+        rise: Mean difference two pixels beside the best place, over that at the best.
     """
 
     offset_px: NDArray[np.float64]
@@ -70,11 +70,11 @@ ELSEWHERE = Fit(np.full(2, np.inf), np.nan)
 
 
 class Comparison:
-    """Two images and a camera, for comparing them at poses that are turned a little.
+    """Compares two images at poses that are turned a little.
 
     Args:
         first, second: The images; the first needs depth.
-        camera: Of both.
+        camera: Intrinsics of both.
     """
 
     def __init__(self, first: Posed, second: Posed, camera: PinholeCamera) -> None:
@@ -94,14 +94,14 @@ class Comparison:
         return len(self._points)
 
     def moved_px(self) -> NDArray[np.float64]:
-        """(N,) how far the truth has each pixel move; NaN for those that leave the image."""
+        """(N,) motion of each pixel by the truth; NaN for those that leave the image."""
         pixels, camera = self._camera.project(self._points), self._camera
         inside = (pixels >= 0) & (pixels <= [camera.width - 1, camera.height - 1])
         start = np.stack([self._at[1], self._at[0]], axis=1)
         return np.where(inside.all(axis=1), np.linalg.norm(pixels - start, axis=1), np.nan)
 
     def error(self, x_px: float, y_px: float, smoothing_px: float = SMOOTHING_PX) -> float:
-        """With the pose turned so that everything lands this much beside."""
+        """Difference of the images with the pose turned by an offset in pixels."""
         here, there = self._smooth[smoothing_px]
         camera = self._camera
         turn = SE3.from_rotation_vector((-y_px / camera.fy, x_px / camera.fx, 0.0))
@@ -109,7 +109,7 @@ class Comparison:
 
 
 def fit(first: Posed, second: Posed, camera: PinholeCamera) -> Fit | None:
-    """Carry the first image into the second; None where too little is to be seen, or moves."""
+    """Fit the first image to the second; None where too little is visible, or moves."""
     compared = Comparison(first, second, camera)
     if len(compared) < MIN_PIXELS:
         return None
@@ -124,7 +124,7 @@ def fit(first: Posed, second: Posed, camera: PinholeCamera) -> Fit | None:
     if np.isnan(coarse[0.0, 0.0]):
         return None
     x, y = min(coarse, key=lambda place: np.nan_to_num(coarse[place], nan=np.inf))
-    # From there downhill, for the coarse steps are wider than the parabola reaches.
+    # Descend from there: the coarse steps are wider than the parabola.
     best = compared.error(x, y)
     for _ in range(MAX_STEPS):
         places = [(x + dx, y + dy) for dx, dy in BESIDE]
@@ -144,7 +144,7 @@ def fit(first: Posed, second: Posed, camera: PinholeCamera) -> Fit | None:
 def fits(
     posed: Callable[[int], Posed | None], pairs: list[tuple[int, int]], camera: PinholeCamera
 ) -> list[Fit]:
-    """Of all pairs of images that can be compared."""
+    """Fits of all pairs of images that can be compared."""
     found = []
     for i, j in pairs:
         first, second = posed(i), posed(j)
@@ -172,7 +172,7 @@ def _sample(image: NDArray[np.float32], pixels: NDArray) -> NDArray[np.float32]:
 
 
 def _difference(here: NDArray, there: NDArray) -> float:
-    """Mean absolute difference after taking out brightness and contrast: exposure changes."""
+    """Mean absolute difference without brightness and contrast, since exposure changes."""
     both = np.isfinite(there)
     if both.sum() < MIN_PIXELS:
         return float("nan")
@@ -181,6 +181,6 @@ def _difference(here: NDArray, there: NDArray) -> float:
 
 
 def _lowest(before: float, here: float, after: float) -> float:
-    """Where the parabola through errors at -SHIFT, 0 and SHIFT is lowest [px]."""
+    """Minimum of the parabola through errors at -SHIFT, 0 and SHIFT [px]."""
     bend = before - 2 * here + after
     return SHIFT_PX * (before - after) / (2 * bend) if bend > 0 else 0.0

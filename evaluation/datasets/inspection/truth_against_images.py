@@ -1,4 +1,4 @@
-"""The truth of a dataset, held against its images."""
+"""Comparison of a dataset's truth with its images."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ TruePose = Callable[[int], SE3 | None]
 
 PAIRS = 12
 APART = 8
-"""Images between the two of a pair."""
+"""Distance of the two images of a pair, in images."""
 MIN_FITS = 3
 MAX_OFFSET_PX = 1.0
 MAX_MEASURED_OFFSET_PX = 10.0
-"""Truth that was measured has a clock and a mounting of its own: 20 ms, while a camera turns by
-50 deg/s, are 10 px. Truth of a simulator has no such excuse."""
+"""Measured truth has a clock and a mounting of its own: 20 ms, while a camera turns by 50 deg/s,
+are 10 px. Truth of a simulator has neither."""
 MIN_RISE = 1.05
-"""If an error of two pixels looks hardly worse, images have no say."""
+"""Least rise of the difference over two pixels; with less, the images decide nothing."""
 MIN_KNOWN = 0.5
 
 
 def look_at_truth(part: str, recording: RobotRecording, true_pose: TruePose | None) -> Finding:
-    """For how many images it is known where they were taken."""
+    """Share of the images whose true pose is known."""
     if true_pose is None:
         return Finding(part, "truth", "none", Verdict.NOTED)
     known = [true_pose(int(stamp)) is not None for stamp in recording.camera_stamps]
@@ -43,7 +43,7 @@ def look_at_truth(part: str, recording: RobotRecording, true_pose: TruePose | No
 
 
 def hold_truth_against_images(part: str, recording: RobotRecording, true_pose: TruePose) -> Finding:
-    """How far the true poses are off the images, in pixels."""
+    """Error of the true poses against the images, in pixels."""
     subject = "truth against images"
     if recording.robot == Source.MAV and recording.layout != "airground":
         return Finding(part, subject, "not checked: there is no depth", Verdict.NOTED)
@@ -66,7 +66,7 @@ def hold_truth_against_images(part: str, recording: RobotRecording, true_pose: T
         return Finding(part, subject, words, Verdict.NOTED)
     offset = float(np.median([np.linalg.norm(one.offset_px) for one in found]))
     if np.isinf(offset):
-        words = f"the truth carries most of each image out of that {APART} images later"
+        words = f"the truth maps most of each image out of that {APART} images later"
         return Finding(part, subject, words, Verdict.WRONG)
     rise = float(np.nanmedian([one.rise for one in found]))
     if rise < MIN_RISE and offset <= MAX_OFFSET_PX:
@@ -89,7 +89,7 @@ Seen = tuple[NDArray[np.uint8], NDArray[np.float32]]
 
 
 def _depth(recording: RobotRecording) -> Callable[[int, SE3], Seen]:
-    """Grey image and depth: measured, or of the true surface where the robot has none."""
+    """Reader of grey image and depth: measured, or of the true surface if the robot has none."""
     truth = None if recording.robot == Source.GROUND else Truth.open(recording.path)
     camera = recording.calibration.camera
 

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial import KDTree
 
 from airground.core.cloud import Source
-from airground.core.events import GroundTracked, MavTracked
+from airground.core.events import Event, GroundTracked, MavTracked
 from airground.core.se3 import SE3
 from airground.errors import InputError
 from evaluation.bench import dense_rows, floors, localization_rows, peers
@@ -22,6 +22,7 @@ from evaluation.bench.material import PARTS, Material, MemoryLog
 from evaluation.bench.rows import NAMES, ROWS, checked_names
 from evaluation.bench.run import timed_curve, timed_row
 from evaluation.bench.work import take_turn
+from evaluation.run.onlooker import Seen
 from evaluation.setup.memory import AddedMemory
 from tests.evaluation.bench.material import T_GROUND_MAV, make_material
 
@@ -186,16 +187,20 @@ def test_peak_memory_counts_touched_pages_only() -> None:
     assert untouched.mib < 4
 
 
+def see(log: MemoryLog, event: Event) -> None:
+    log.see(Seen(event, 0.0, None, None))
+
+
 def test_memory_is_read_after_each_tenth_of_the_recording(material: Material) -> None:
     stamps_ns = material.recording.of(Source.GROUND).camera_stamps
     log = MemoryLog(material.recording, [os.getpid()])
     for stamp_ns in stamps_ns:
-        log.take(MavTracked(int(stamp_ns), SE3.identity()))
+        see(log, MavTracked(int(stamp_ns), SE3.identity()))
     assert log.resident_mib == []
     for stamp_ns in stamps_ns[:-1]:
-        log.take(GroundTracked(int(stamp_ns), SE3.identity()))
+        see(log, GroundTracked(int(stamp_ns), SE3.identity()))
     assert len(log.resident_mib) < PARTS
-    log.take(GroundTracked(int(stamps_ns[-1]), SE3.identity()))
+    see(log, GroundTracked(int(stamps_ns[-1]), SE3.identity()))
     assert len(log.resident_mib) == PARTS
     assert min(log.resident_mib) > 10
 

@@ -121,7 +121,7 @@ def test_a_truth_that_carries_images_out_of_each_other_is_found(tum: Path) -> No
     turned(tum, (0.0, 70.0, 0.0))
     found = of(inspect_dataset(tum)[1], "ground", "truth against images")
     assert found.verdict is Verdict.WRONG
-    assert found.found.startswith("the truth carries most of each image out")
+    assert found.found.startswith("the truth maps most of each image out")
 
 
 def test_a_truth_in_other_axes_is_found(tum: Path) -> None:

@@ -91,7 +91,7 @@ def test_samples_and_calibration_are_as_told(bag: Bag, simulated: Simulated) -> 
             np.testing.assert_array_equal([turn.x, turn.y, turn.z], imu.gyro[index])
         field = bag[f"/{robot}/magnetic_field"][7][1].magnetic_field
         np.testing.assert_array_equal([field.x, field.y, field.z], magnetic.field[7])
-        camera = simulated.told(robot).camera.pinhole()
+        camera = simulated.nominal(robot).camera.pinhole()
         info = bag[f"/{robot}/camera/camera_info"][0][1]
         np.testing.assert_array_equal(info.k.reshape(3, 3), camera.matrix())
         assert (info.width, info.height) == (camera.width, camera.height)
@@ -107,7 +107,7 @@ def test_the_tree_of_frames_leads_to_the_camera(bag: Bag, simulated: Simulated) 
             assert edge.header.frame_id == f"{robot}/{parent}"
             q, t = edge.transform.rotation, edge.transform.translation
             T = T @ SE3.from_quaternion_xyzw([q.x, q.y, q.z, q.w], [t.x, t.y, t.z])
-        calibration = simulated.told(robot).calibration()
+        calibration = simulated.nominal(robot).calibration()
         told = calibration.T_body_imu @ calibration.T_imu_camera
         assert np.abs((T.inverse() @ told).log()).max() < 1e-9
         for stamp, message in bag[f"/{robot}/truth/camera"]:
