@@ -39,7 +39,6 @@ class Check(Verb):
         from evaluation.judge.results import read_table
         from evaluation.judge.verdict import Verdict, compare
         from evaluation.show.comparison import verdict_table
-        from evaluation.show.comparison.junit import junit
 
         before = self._reference()
         after = Measured.of(read_table(self.results), before.condition)
@@ -48,7 +47,7 @@ class Check(Verb):
         if self.markdown is not None:
             self.markdown.write_text(verdict_table.markdown(comparison), encoding="utf-8")
         if self.junit is not None:
-            self.junit.write_text(junit(comparison), encoding="utf-8")
+            self.junit.write_text(verdict_table.junit(comparison), encoding="utf-8")
         return int(bool(comparison.of(Verdict.WORSE)))
 
     def _reference(self) -> Measured:

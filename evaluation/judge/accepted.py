@@ -1,7 +1,7 @@
-"""`accepted.json`: the figures that a change is held against, and why they were accepted.
+"""`accepted.json`: the figures that a change is compared with, and why they were accepted.
 
-Values are kept one by one under their flight, so that results of the same seeds can be
-paired with them. JSON knows no infinity: null is a failure.
+The file has every value under its flight, so that results of the same seeds can be paired with
+them. JSON has no infinity: null is a failure.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ class _Part(BaseModel):
 
 
 class Acceptance(_Part):
-    """One decision: who reads the history learns why the figures moved.
+    """One decision, with the reason why the figures moved.
 
     Attributes:
-        headline: The figure of every metric then; null where it was a failure.
+        headline: The figure of every metric at that time; null where it was a failure.
     """
 
     date: date
@@ -52,7 +52,7 @@ class ConditionPart(_Part):
 
 
 class MetricPart(_Part):
-    """The values of one metric: one list a flight, in the order of `Accepted.flights`."""
+    """The values of one metric: one list per flight, in the order of `Accepted.flights`."""
 
     unit: str
     each: str
@@ -60,7 +60,7 @@ class MetricPart(_Part):
 
 
 class Accepted(_Part):
-    """Everything that `accepted.json` holds; the newest acceptance is last in the history."""
+    """Content of `accepted.json`; the newest acceptance is last in the history."""
 
     schema_: Literal[1] = Field(alias="schema")
     suite: str
@@ -83,10 +83,12 @@ class Accepted(_Part):
         """Accept figures; the history of `before` is kept.
 
         Raises:
-            InputError: The reason says nothing.
+            InputError: The reason is empty.
         """
         if not reason.strip():
-            raise InputError("--reason: say why these figures are right; it is kept with them")
+            raise InputError(
+                "--reason: state why these figures are right; the file keeps it with them"
+            )
         decision = Acceptance(
             date=on,
             git_revision=git_revision,
@@ -113,7 +115,7 @@ class Accepted(_Part):
         )
 
     def measured(self) -> Measured:
-        """The accepted figures as what they were: something measured.
+        """The accepted figures as measured values.
 
         Raises:
             InputError: This version watches other metrics.
@@ -136,7 +138,7 @@ class Accepted(_Part):
         return Measured(self.suite, Condition(**vars(self.condition)), self.flights, samples)
 
     def write(self, path: Path) -> None:
-        """Write one line a flight and metric, so that a diff shows what moved."""
+        """Write one line per flight and metric, so that a diff shows the changes."""
         made = self.model_dump(by_alias=True, mode="json")
         lines = json.dumps(made, indent=1, allow_nan=False, ensure_ascii=False)
         partial = path.with_name(f".{path.name}.partial")

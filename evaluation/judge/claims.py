@@ -1,4 +1,4 @@
-"""What localization and refinement claim, who is wrong, and whether the spread says so."""
+"""Claims of localization and refinement, wrong ones among them, and their calibration."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from evaluation.table.intervals import Rate, wilson
 from evaluation.table.rows import CONTROL_SCENES, SEQUENCE_KEYS, ResultTable
 
 TO_BE_FOUND = "found"
-"""The case in which there is something to find."""
+"""The case in which there is a place to find."""
 NO_STRUCTURE = "no_structure"
 """The case of the control scenes."""
 ALL = "all"
@@ -25,12 +25,7 @@ ALL = "all"
 
 @dataclass(frozen=True)
 class Claims:
-    """What was claimed in one case.
-
-    Attributes:
-        accepted: Of all that were asked.
-        wrong: Of those accepted.
-    """
+    """Claims in one case: the share of cases with a claim, and of claims that are wrong."""
 
     accepted: Rate
     wrong: Rate
@@ -51,18 +46,18 @@ class Claims:
 
 
 def localization_claims(table: ResultTable) -> dict[str, Claims]:
-    """Claims of a position by case, `ALL` last (of one condition); one entry an aerial map.
+    """Claims of a position by case, `ALL` last (of one condition); one per aerial map.
 
-    Where there is something to find, a claim farther off than 0.25 m in the horizontal plane
-    is wrong; elsewhere every one is.
+    Where there is a place to find, a claim is wrong if it is off by more than `LOCATED_M` in the
+    horizontal plane; elsewhere every claim is wrong.
     """
     return _by_case(table, samples.claimed, samples.claimed_wrongly, "converged")
 
 
 def refinement_claims(table: ResultTable) -> dict[str, Claims]:
-    """Accepted refinements by case, `ALL` last (of one condition); one entry a trial.
+    """Accepted refinements by case, `ALL` last (of one condition); one per trial.
 
-    Where there is something to find, one farther off than 5 cm or 2 degrees is wrong; elsewhere
+    Where there is a place to find, one that is no good pose (`is_good_pose`) is wrong; elsewhere
     every one is.
     """
     return _by_case(table, samples.refined("accepted"), samples.refined_wrongly, "accepted")
@@ -74,7 +69,7 @@ def _by_case(
     wrong: Callable[[ResultTable], pd.Series],
     metric: str,
 ) -> dict[str, Claims]:
-    """Cases in which nothing was asked are left out, and `ALL` without any case."""
+    """Cases without any value are left out, and `ALL` if there is none."""
     controls = [scene for scene in table.scenes() if scene in CONTROL_SCENES]
     places = table.of_scenes(scene for scene in table.scenes() if scene not in CONTROL_SCENES)
     flat = claimed(table.of_scenes(controls))
@@ -95,18 +90,18 @@ def _negative(table: ResultTable, case: Case, metric: str) -> Claims:
 METRIC = "squared_mahalanobis"
 """Of the stage "localization"."""
 ELLIPSES = (0.50, 0.90, 0.99)
-"""Shares of a Gaussian that lie in the ellipses that are looked at."""
+"""Shares of a Gaussian in the ellipses that are examined."""
 FREEDOM = 2
 """Degrees of freedom of a horizontal position."""
 
 
 @dataclass(frozen=True)
 class Localizations:
-    """All that localization said of its own errors, one entry an aerial map.
+    """Errors of localization and the errors that it reports, one per aerial map.
 
     Attributes:
         error_m, spread_m: (N,) horizontal error and the particles' standard deviation [m].
-        squared_mahalanobis: (N,) of the true position in the particles' covariance.
+        squared_mahalanobis: (N,) distance of the true position in the particles' covariance.
         accepted: (N,) whether a position was claimed.
     """
 
@@ -131,11 +126,11 @@ class Localizations:
         return wilson(int(inside.sum()), len(self))
 
     def mean_normalized_error(self) -> float:
-        """Mean NEES over its degrees of freedom: 1 is right, above is too sure; NaN for none."""
+        """Mean NEES over its degrees of freedom: above 1 is overconfident; NaN of none."""
         return float(self.squared_mahalanobis.mean() / FREEDOM) if len(self) else float("nan")
 
     def median_normalized_error(self) -> float:
-        """Median NEES over a Gaussian's: 1 is right, and outliers do not matter; NaN for none."""
+        """Median NEES over that of a Gaussian: above 1 is overconfident; NaN of none."""
         if len(self) == 0:
             return float("nan")
         return float(np.median(self.squared_mahalanobis) / chi2.ppf(0.5, FREEDOM))
@@ -151,7 +146,7 @@ class Localizations:
 
 
 def localizations(table: ResultTable) -> Localizations:
-    """All beliefs of a table; aerial maps that never came gave none."""
+    """All beliefs of a table; an aerial map that was not made has none."""
     keys = [*SEQUENCE_KEYS, "iteration"]
     metrics = ["error_m", "spread_m", METRIC, "converged"]
     frame = table.frame[
@@ -185,7 +180,7 @@ class ShareOf(Part):
 
 
 class ClaimsPart(Part):
-    """Of all that were asked, those accepted; of those, the wrong ones."""
+    """`Claims` in the file."""
 
     accepted: ShareOf
     wrong: ShareOf
@@ -203,7 +198,7 @@ class ClaimsSummary(Part):
 
 
 class CalibrationPart(Part):
-    """Of some localizations: 1 is right for both normalized errors, above is too sure."""
+    """Calibration of some localizations; normalized errors are 1 where it is right."""
 
     localizations: Count
     normalized_error_mean: Number

@@ -1,4 +1,4 @@
-"""How live runs went, in the few numbers that `summary.json`, screen and report show."""
+"""Live runs in the few numbers that `summary.json`, screen and report show."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from evaluation.table.intervals import quantile
 from evaluation.table.rows import LIVE_STAGE, ResultTable
 
 DEADLINE_MS = 100.0
-"""A pose that comes later than this after its image counts as a deadline missed."""
+"""A pose later than this after its image has missed the deadline [ms]."""
 
 
 class Latency(Part):
-    """From the moment when an image was due [ms]."""
+    """Time since an image was due [ms]."""
 
     median: Number
     p95: Number
@@ -32,16 +32,16 @@ class LiveRobot(Part):
     """One robot; counts are sums and the rest maxima over the runs.
 
     Attributes:
-        survived: Runs in which its process lived to the end.
-        images, dropped: All, and those that found the tracker's buffer full.
-        shed, lost, late: Tracked frames that the mapper had no room for, that the radio lost,
-            that came too late to be put in order.
+        survived: Runs in which its process ran to the end.
+        images, dropped: Number of images, and of those dropped since the tracker's buffer was full.
+        shed, lost, late: Tracked frames dropped by a full mapper, lost by the radio, or too late
+            to be put in order.
         deadlines_missed: Poses later than `DEADLINE_MS`.
-        posed_ms, mapped_ms: To the pose, and to the end of all that the mapper made of it.
+        posed_ms, mapped_ms: Latency of the pose, and of the end of the mapper's work on it.
         longest_queue, most_under_way: Images before the tracker, frames before the mapper.
-        mbit_s: What it sent to the mapper.
-        processor_share: Of one core.
-        peak_memory_mib: Of its process.
+        mbit_s: Data rate to the mapper [Mbit/s].
+        processor_share: Share of one core.
+        peak_memory_mib: Memory of its process [MiB].
     """
 
     survived: Count
@@ -61,14 +61,14 @@ class LiveRobot(Part):
 
 
 class LiveSummary(Part):
-    """How the runs with --realtime went.
+    """The live runs.
 
     Attributes:
-        runs: How many.
+        runs: Number of runs.
         mav, ground: The robots.
-        aligned_ms: From a surface's last image to its place in the ground map.
-        mapper_processor_share: Of one core.
-        peak_memory_mib: Of all processes together.
+        aligned_ms: Time from a surface's last image to its place in the ground map.
+        mapper_processor_share: Share of one core.
+        peak_memory_mib: Memory of all processes together [MiB].
     """
 
     runs: Count

@@ -1,4 +1,4 @@
-"""What one run measured of the watched metrics, ready to be held against another's."""
+"""The watched metrics of one run, ready to be compared with those of another."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class Measured:
     """The watched metrics of one condition.
 
     Attributes:
-        suite: Which scenes, and how many flights over each.
-        condition: Under what.
+        suite: Scenes, and number of flights over each.
+        condition: Condition of the measurement.
         flights: All of them, sorted.
         samples: By the metric's name, then by flight.
     """
@@ -33,7 +33,7 @@ class Measured:
 
     @classmethod
     def of(cls, table: ResultTable, condition: Condition | None = None) -> Measured:
-        """What a table says under one condition; None for its first.
+        """The watched metrics of a table under one condition, by default its first.
 
         Raises:
             InputError: Nothing was measured under the condition.
@@ -50,7 +50,7 @@ class Measured:
         return cls(suite_of(everyone), chosen, everyone, samples)
 
     def only(self, kept: set[Flight]) -> Measured:
-        """Without the other flights."""
+        """The same without the other flights."""
         remaining = [flight for flight in self.flights if flight in kept]
         samples = {
             name: {flight: values for flight, values in by_flight.items() if flight in kept}
@@ -60,13 +60,13 @@ class Measured:
 
 
 def suite_of(everyone: list[Flight]) -> str:
-    """In words: the scenes and how many flights over each."""
+    """The scenes and number of flights over each, as text."""
     counts = Counter(flight.scene for flight in everyone)
     return ", ".join(f"{scene} x {count}" for scene, count in sorted(counts.items()))
 
 
 def figure(metric: Metric, samples: Samples) -> float:
-    """The one number told of a metric: each flight's median (or share), and their middle.
+    """The one number of a metric: the median of the flights' medians, or mean of their shares.
 
     NaN where nothing was measured.
     """

@@ -91,7 +91,7 @@ class PoseReading:
 
 
 def read_poses(metric: PoseMetric, robot: str, table: ResultTable) -> PoseReading:
-    """What a table says of one robot; scale errors count by their size."""
+    """A metric of one robot in a table; scale errors count by their size."""
     values = table.values("trajectory", f"{robot}_{metric.name}")
     if metric.name.endswith("scale_error"):
         values = np.abs(values)

@@ -1,4 +1,4 @@
-"""What a table says of a metric: a share or a median, with its 95 % interval.
+"""The reading of a metric from a table: a share or a median, with its 95 % interval.
 
 Every number of the summary, the report and the sweeps is read here. Values are pooled over all
 flights; verdicts, which take flights as observations, are `evaluation.judge.verdict`'s.

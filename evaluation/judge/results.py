@@ -1,4 +1,4 @@
-"""The files that a run leaves, written and read back, and where results come from."""
+"""The files that a run leaves: names, reading, and several runs as one."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ TABLE, SUMMARY, CONFIG, SHOWCASE = "results.parquet", "summary.json", "config.to
 
 @dataclass(frozen=True)
 class Results:
-    """Everything that was measured, and how.
+    """All measurements, and their parameters.
 
     Attributes:
         table: The measurements; the first condition in it is the primary one.
         config: The primary setup's parameters, as resolved.
-        seed: Of all that was random.
-        showcase: What pictures are drawn from, where it was gathered.
-        notes: What the reader of a report should know.
+        seed: Seed of everything random.
+        showcase: Data of the pictures; None without pictures.
+        notes: Sentences for the end of the report.
     """
 
     table: ResultTable

@@ -17,7 +17,7 @@ from evaluation.judge.verdict import MOVED, Comparison, Verdict, compare
 from evaluation.table.rows import SEQUENCE_KEYS, ResultTable
 
 MOST_RUNS = 4
-"""More would not be told apart in a figure."""
+"""More runs would have no colour of their own in a figure."""
 
 
 @dataclass(frozen=True)
@@ -25,10 +25,10 @@ class Run:
     """What one run left, of its primary condition.
 
     Attributes:
-        name: What readers call it.
+        name: Its name for readers.
         table: Its rows, control scenes included.
         config: Its parameters, as resolved.
-        summary: Where it comes from, among others.
+        summary: Its summary, with the origin of the run.
         measured: Its watched metrics.
     """
 
@@ -73,12 +73,12 @@ class Against:
     left_out: int
 
     def caveats(self) -> list[str]:
-        """What a reader should know before believing the verdicts."""
+        """Limits of the comparison that a reader needs beside the verdicts."""
         made = []
         if not self.shared:
             made.append(
-                "No flight is the same in both runs: they are compared as two samples, which "
-                "sees less than pairs do, and takes the flights as drawn alike."
+                "No flight is the same in both runs: they are compared as two samples, which is "
+                "less sensitive than pairs and assumes that the flights of both are drawn alike."
             )
         if self.left_out:
             made.append(
@@ -103,11 +103,11 @@ class Against:
         return made
 
     def outcome(self) -> str:
-        """How many metrics moved which way, in a few words."""
+        """Number of metrics with each verdict of a change, in a few words."""
         counts = [
             f"{len(self.comparison.of(verdict))} {verdict}"
-            for verdict in Verdict
-            if verdict in MOVED and self.comparison.of(verdict)
+            for verdict in MOVED
+            if self.comparison.of(verdict)
         ]
         if not counts and not self.comparison.of(Verdict.SAME):
             return "no verdict possible"
@@ -126,7 +126,7 @@ def read_runs(folders: Sequence[Path]) -> list[Run]:
         )
     twice = [path for path, count in Counter(p.resolve() for p in folders).items() if count > 1]
     if twice:
-        raise InputError(f"{twice[0]}: given twice; a run does not differ from itself")
+        raise InputError(f"{twice[0]}: given twice; compare different runs")
     names = distinct_names(folders)
     return [Run.read(folder, name) for folder, name in zip(folders, names, strict=True)]
 
@@ -134,7 +134,7 @@ def read_runs(folders: Sequence[Path]) -> list[Run]:
 def against(reference: Run, run: Run) -> Against:
     """Hold a run against the reference, over the flights that both have.
 
-    Where they share none, all flights of both are compared as two samples.
+    Without a shared flight, all flights of both are compared as two samples.
 
     Raises:
         InputError: No flight is shared, and the scenes or numbers of flights differ too.
@@ -154,7 +154,7 @@ def against(reference: Run, run: Run) -> Against:
 
 
 def distinct_names(folders: Sequence[Path]) -> list[str]:
-    """The folders' names, with as many of their parents' as tell them apart."""
+    """The folders' names, preceded by parents' names until all differ."""
     parts = [folder.resolve().parts for folder in folders]
     depth = 1
     while len({part[-depth:] for part in parts}) < len(parts):

@@ -1,8 +1,8 @@
 """`summary.json`: the contract that regression checks and other programs read.
 
-One summary speaks of one condition. A quantile that failures reach (they count as
-infinite) is null, and so is whatever was not measured; keys are always there. With an
-oracle's poses no SLAM ran, so that all of `slam` is null; without --realtime `realtime` is.
+A summary is of one condition. All keys are always there. A quantile that failures reach (they
+count as infinite) is null, and so is what was not measured: all of `slam` with poses from an
+oracle, `realtime` without a live run.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Machine(Part):
 
 
 class Surface(Part):
-    """Medians over the fused surfaces of each one's median, 90th percentile, completeness."""
+    """Medians over the fused surfaces of their median, 90th percentile and completeness."""
 
     error_median_m: Number
     error_p90_m: Number

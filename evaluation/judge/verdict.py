@@ -3,8 +3,8 @@
 Both sides must be of one suite. The same flights on both sides are paired, and so are their
 trials one by one; entirely different flights are two samples. Better or worse needs two
 things: the change is consistent beyond chance, after Holm's correction for all metrics
-together, and it is at least as large as matters. What is beyond chance but smaller has moved;
-it is shown, and fails nothing.
+together, and it is at least as large as matters. A smaller change beyond chance is shown and
+fails nothing. One observation shows nothing about chance: it gets no verdict.
 """
 
 from __future__ import annotations
@@ -53,13 +53,13 @@ MOVED = (Verdict.WORSE, Verdict.BETTER, Verdict.SLIGHTLY_WORSE, Verdict.SLIGHTLY
 
 @dataclass(frozen=True)
 class Compared:
-    """What is told of one metric before all are judged together.
+    """The change in one metric, before all are judged together.
 
     Attributes:
-        effect: What changed.
-        count: How many observations were compared; of two samples, the fewer.
-        by_flight: Whether a flight is one observation. Else its trials are, taken as
-            independent, which they are not quite.
+        effect: Size, interval and chance of the change.
+        count: Number of observations; of two samples, the smaller.
+        by_flight: Whether a flight is one observation. Else each of its trials is, taken as
+            independent, although trials of one flight are not quite.
     """
 
     effect: Effect
@@ -69,15 +69,16 @@ class Compared:
 
 @dataclass(frozen=True)
 class Judged:
-    """One metric.
+    """One metric with its verdict.
 
     Attributes:
-        metric: Which.
+        metric: The metric.
         before, after: Its figure on both sides; NaN where nothing was measured.
-        compared: What changed, None where nothing was measured.
-        p: Of no change, adjusted for all metrics; NaN where nothing was measured.
-        matters: The smallest effect that does, in the metric's unit.
-        verdict: What follows.
+        compared: The change; None where nothing was measured.
+        p: Probability of the change by chance, adjusted for all metrics; NaN where nothing was
+            measured.
+        matters: The smallest effect that matters, in the metric's unit.
+        verdict: The verdict.
     """
 
     metric: Metric
@@ -94,9 +95,9 @@ class Comparison:
     """All metrics.
 
     Attributes:
-        suite: The scenes, and how many flights over each.
-        condition: Under what `before` was measured.
-        paired: Whether both sides flew the same flights.
+        suite: The scenes, and number of flights over each.
+        condition: Condition of `before`.
+        paired: Whether both sides have the same flights.
         judged: In the order of `WATCHED`.
     """
 
@@ -134,7 +135,7 @@ def compare(before: Measured, after: Measured) -> Comparison:
 
 
 def _paired(before: Measured, after: Measured) -> bool:
-    """Whether both flew the same flights; refuses what cannot be compared."""
+    """Whether both have the same flights; raises where no comparison is possible."""
     if before.suite != after.suite:
         raise InputError(f"measured over {after.suite}; expected {before.suite}")
     shared = len(set(before.flights) & set(after.flights))
@@ -147,7 +148,7 @@ def _paired(before: Measured, after: Measured) -> bool:
 
 
 def _compared(metric: Metric, before: Samples, after: Samples, paired: bool) -> Compared | None:
-    """What changed in one metric; None where neither side measured anything."""
+    """The change in one metric; None where neither side measured anything."""
     if not any(before.values()) and not any(after.values()):
         return None
     if paired:
@@ -195,7 +196,7 @@ def _observations(metric: Metric, samples: Samples, by_flight: bool) -> NDArray[
 
 
 def _reaches(least_p: float) -> bool:
-    """Whether so few observations could ever say anything, with all metrics watched."""
+    """Whether p can be small enough for a verdict, adjusted for all watched metrics."""
     return least_p * len(WATCHED) <= ALPHA
 
 

@@ -1,4 +1,4 @@
-"""Under what something was measured: what every figure and table states."""
+"""The condition of a measurement, which every figure and table states."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Condition:
-    """Under what something was measured; every figure and table states it.
+    """The condition of a measurement.
 
     Attributes:
         preset: "paper" or "best".
         poses: "slam", "oracle exact", "oracle with drift", or "slam, exact mav" (or ground).
         sensors: "none", "nominal" or "harsh".
         heading: "known" or "search".
-        variant: What else differs from the preset, in words; empty when nothing does.
+        variant: Other differences from the preset, as text; empty without any.
     """
 
     preset: str
@@ -25,7 +25,7 @@ class Condition:
     variant: str = ""
 
     def parts(self) -> tuple[str, ...]:
-        """What it consists of, in words."""
+        """Its parts as text."""
         poses = {
             "slam": "poses from SLAM",
             "oracle exact": "exact poses",
@@ -59,6 +59,6 @@ def short_labels(conditions: Sequence[Condition]) -> list[str]:
 
 
 def shared_parts(conditions: Sequence[Condition]) -> str:
-    """What the short labels leave out because all conditions share it."""
+    """The parts that all conditions share and short labels leave out."""
     columns = list(zip(*(condition.parts() for condition in conditions), strict=True))
     return ", ".join(column[0] for column in columns if len(set(column)) == 1)

@@ -1,8 +1,8 @@
-"""What the paper reports, each number with its source.
+"""The numbers of the paper, each with its source.
 
 Forster, Pizzoli, Scaramuzza: Air-Ground Localization and Map Augmentation Using Monocular
-Dense Reconstruction, IROS 2013. Real robots, real sensors: no target that a simulation
-could beat.
+Dense Reconstruction, IROS 2013. Real robots and sensors: a simulation cannot
+improve on them.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ class TimedStage:
     Attributes:
         metric: Its name in the results table and in `summary.json`.
         title: Its name for readers.
-        group: The heading it stands under in Table I.
+        group: Its heading in Table I.
         published_ms: The paper's average [ms], or None where the paper has none.
-        processor: Where the paper ran it.
-        in_summary: Whether `summary.json` holds it.
+        processor: Processor of the paper's measurement.
+        in_summary: Whether `summary.json` has it.
     """
 
     metric: str

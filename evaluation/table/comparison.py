@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 from scipy import stats
 
 PERMUTATIONS = 10_000
-"""Tests are exact up to so many rearrangements, and draw as many where there are more."""
+"""Tests are exact up to this number of rearrangements; beyond it they draw as many."""
 RESAMPLES = 2_000
 SEED = 20_131_103
 """Seed of the rearrangements and the bootstrap: the same results give the same verdict."""
 LEAST_OBSERVATIONS = 2
-"""Fewer observations say nothing about chance."""
+"""One observation shows nothing about chance."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def adjusted(p_values: Sequence[float]) -> list[float]:
 
 
 def least_paired_p(pairs: int) -> float:
-    """The smallest p that so many paired differences can reach."""
+    """The smallest p that a number of paired differences can reach."""
     return min(1.0, 2.0 ** (1 - pairs))
 
 
@@ -168,8 +168,8 @@ def _medians(samples: NDArray[np.float64]) -> NDArray[np.float64]:
 def _effect(value: float, draws: NDArray[np.float64], n: int, p: float) -> Effect:
     """With the expanded percentile interval, which few observations need.
 
-    Resampling N observations spreads sqrt((N - 1) / N) too little, and does not know that
-    the spread is itself estimated (Hesterberg, The American Statistician 69(4), 2015).
+    Resampling N observations spreads sqrt((N - 1) / N) too little, and neglects that the
+    spread is itself estimated (Hesterberg, The American Statistician 69(4), 2015).
     """
     reach = stats.t.ppf(0.975, n - 1) * np.sqrt(n / (n - 1))
     tail = float(stats.norm.cdf(-reach))

@@ -1,4 +1,4 @@
-"""Whether a front end is as sure as it should be: errors against the covariance it reports."""
+"""Consistency of a front end: its errors against the covariance that it reports."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from airground.core.se3 import SE3
 from airground.slam.front_end import TrackedPose
 
 MIN_POSES = 3
-"""Fewer say nothing."""
+"""Fewer poses show nothing: they can be aligned almost at will."""
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Consistency:
 
     Attributes:
         nees: Mean over the images, divided by the degrees of freedom: 1 where the covariance
-            is right, above where the front end is too sure. NaN where none was reported.
+            is right, above 1 where the front end is overconfident. NaN where none was reported.
         within_95: Share of the images whose error lies in the 95 % region; 0.95 is right.
     """
 

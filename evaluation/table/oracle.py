@@ -1,7 +1,7 @@
-"""Front ends that know the truth: poses with a stated noise and drift, zero included.
+"""Front ends with access to the truth: poses with a stated noise and drift, zero included.
 
-They enter the pipeline through the same seam as SLAM, so that what the back end loses can
-be told from what tracking loses. Every result says which front end it used.
+They enter the pipeline where SLAM does, which separates the errors of the back end from those
+of tracking. Every result states its front end.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ class Oracle:
         """An oracle puts nothing off."""
 
     def trajectory(self) -> Trajectory | None:
-        """The poses as they were returned."""
+        """The poses as returned."""
         if not self._tracked:
             return None
         stamps, poses = zip(*self._tracked, strict=True)

@@ -18,8 +18,7 @@ class RowWriter:
 
     def __init__(self, scene: str, seed: int, flight: int, condition: Condition) -> None:
         self.rows: list[Row] = []
-        self._recording = (scene, seed, flight)
-        self._condition = condition
+        self._shared = (scene, seed, flight, condition)
 
     def add(
         self,
@@ -34,25 +33,9 @@ class RowWriter:
         time_s: float | None = None,
         note: str = "",
     ) -> None:
-        """One row; see `Row` for what the words mean."""
-        scene, seed, flight = self._recording
-        self.rows.append(
-            Row(
-                scene=scene,
-                seed=seed,
-                flight=flight,
-                condition=self._condition,
-                stage=stage,
-                metric=metric,
-                value=float(value),
-                unit=unit,
-                sequence=sequence,
-                iteration=iteration,
-                trial=trial,
-                note=note,
-                time_s=time_s,
-            )
-        )
+        """One row; `Row` describes the fields."""
+        what = (stage, metric, float(value), unit)
+        self.rows.append(Row(*self._shared, *what, sequence, iteration, trial, note, time_s))
 
     def add_belief(
         self,
@@ -80,33 +63,19 @@ class RowWriter:
             ("converged", belief.converged, ""),
         ):
             note = {"converged": belief.refusal, "error_m": origin}.get(metric, "")
-            self.add(
-                "localization",
-                metric,
-                value,
-                unit,
-                sequence=sequence,
-                iteration=iteration,
-                note=note,
-            )
+            where = {"sequence": sequence, "iteration": iteration}
+            self.add("localization", metric, value, unit, note=note, **where)
 
     def add_no_belief(self, reason: str, sequence: int, iteration: int) -> None:
-        """An aerial map that never came: counts as failed."""
+        """An aerial map that was not made: counts as failed."""
         nothing = float("nan")
         for metric, value, unit in (
             ("error_m", nothing, "m"),
             ("error_deg", nothing, "deg"),
             ("converged", 0.0, ""),
         ):
-            self.add(
-                "localization",
-                metric,
-                value,
-                unit,
-                sequence=sequence,
-                iteration=iteration,
-                note=reason,
-            )
+            where = {"sequence": sequence, "iteration": iteration}
+            self.add("localization", metric, value, unit, note=reason, **where)
 
     def add_alignment(
         self,
@@ -117,9 +86,7 @@ class RowWriter:
     ) -> None:
         """A refinement (Fig. 13, 14): errors by time, "before" and "after" among them."""
         for when, error in errors.items():
-            metric = f"{when}_translation_m"
-            self.add(stage, metric, error.translation_m, "m", trial=trial)
-            metric = f"{when}_rotation_deg"
-            self.add(stage, metric, error.rotation_deg, "deg", trial=trial)
+            self.add(stage, f"{when}_translation_m", error.translation_m, "m", trial=trial)
+            self.add(stage, f"{when}_rotation_deg", error.rotation_deg, "deg", trial=trial)
         accepted, refusal = alignment.accepted, alignment.refusal
         self.add(stage, "accepted", accepted, "", trial=trial, note=refusal)

@@ -1,4 +1,4 @@
-"""One row per measured thing: what experiments write and reports read."""
+"""One row per measured value: experiments write them, reports read them."""
 
 from __future__ import annotations
 
@@ -50,17 +50,15 @@ _DTYPES = {
 
 @dataclass(frozen=True)
 class Row:
-    """One measured thing.
+    """One measured value.
 
     Attributes:
-        scene, seed, flight: Which recording it comes from.
-        condition: Under what it was measured.
-        stage, metric, value, unit: What was measured; a value that a failure left without
-            a number is NaN.
-        sequence, iteration, trial: Which one it was, where that applies; iterations
-            count from 1.
-        note: Why, in words: the reason of a refusal.
-        time_s: When in the recording, where something is measured over time [s].
+        scene, seed, flight: The recording.
+        condition: The condition of the measurement.
+        stage, metric, value, unit: The measurement; NaN where a failure left no number.
+        sequence, iteration, trial: Their numbers, where that applies; iterations count from 1.
+        note: A reason in words, for example of a refusal.
+        time_s: Time in the recording, of a value that is measured over time [s].
     """
 
     scene: str
@@ -168,8 +166,8 @@ class ResultTable:
     def sequences(self, metric: str) -> pd.DataFrame:
         """A localization metric per sequence (rows) and iteration (columns 1, 2, ...).
 
-        Every sequence of which the table says anything has a row, and every iteration up
-        to the longest sequence's a column; what was not measured is NaN.
+        There is a row for every sequence in the table, and a column for every iteration up to
+        that of the longest sequence; what was not measured is NaN.
         """
         frame = self.frame[self.frame["stage"] == "localization"]
         keys = frame[SEQUENCE_KEYS].drop_duplicates()

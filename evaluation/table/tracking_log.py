@@ -1,4 +1,4 @@
-"""What front ends answered, image by image, and how long they took."""
+"""Answers of front ends, image by image, and their processing times."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _RECORD = np.dtype(
 class AnswerLog(Sequence[TrackedPose]):
     """Answers in order of time, without their corners; each is made anew when it is asked for.
 
-    As objects they took 3.3 kB each, which in ten minutes of two robots is 120 MB.
+    As objects they take 3.3 kB each, or 120 MB in ten minutes of two robots.
 
     Args:
         answers: The first ones.
@@ -117,19 +117,19 @@ Image = TypeVar("Image", MavImage, GroundImage)
 
 @dataclass
 class FrontEndLog:
-    """What a front end said.
+    """Answers of a front end.
 
     Attributes:
-        answers: One an image, in order of time, without corners.
-        durations_ms: Of each image with the inertial samples before it, mapping included,
-            decoding not.
+        answers: One per image, in order of time, without corners.
+        durations_ms: Processing time of each image and the inertial samples before it, with
+            mapping, without decoding.
     """
 
     answers: AnswerLog = field(default_factory=AnswerLog)
     durations_ms: list[float] = field(default_factory=list)
 
     def live_poses(self) -> list[tuple[int, SE3]]:
-        """Stamp and pose of each tracked image, as they were said at its time."""
+        """Stamp and live pose of each tracked image."""
         return [(a.stamp_ns, a.T_map_camera) for a in self.answers if a.T_map_camera is not None]
 
 
@@ -137,8 +137,8 @@ class WatchedFrontEnd(FrontEndLog, Generic[Image]):
     """Passes everything on, and keeps the answers and their times.
 
     Args:
-        inner: Who really tracks.
-        clock: Tells the time [s].
+        inner: The front end that tracks.
+        clock: Gives the time [s].
     """
 
     def __init__(
@@ -169,23 +169,23 @@ class WatchedFrontEnd(FrontEndLog, Generic[Image]):
         self._inner.finish()
 
     def trajectory(self) -> Trajectory | None:
-        """The poses that it believes in now."""
+        """The current poses of all images."""
         return self._inner.trajectory()
 
     def log(self) -> FrontEndLog:
-        """What it said, without itself."""
+        """The answers, without the front end."""
         return FrontEndLog(self.answers, self.durations_ms)
 
 
 @dataclass(frozen=True, eq=False)
 class Tracked:
-    """What a front end left of a recording.
+    """A front end's result over a recording.
 
     Attributes:
         robot: "mav" or "ground".
-        front_end: What it said, image by image.
-        final: The poses that it believed in at the end.
-        slam: Whether it was SLAM, whose times mean something.
+        front_end: Its answers, image by image.
+        final: Its poses after the last image.
+        slam: Whether it was SLAM, so that its times are worth keeping.
     """
 
     robot: str

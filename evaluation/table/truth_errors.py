@@ -31,7 +31,7 @@ class PoseError:
 
 
 class BothPoses(Protocol):
-    """Where both cameras were, as their front ends said; a `Sighting` tells it."""
+    """Poses of both cameras by their front ends, for example a `Sighting`."""
 
     @property
     def mav_stamp_ns(self) -> int: ...
@@ -64,13 +64,13 @@ def pose_error(T_ground_mav: SE3, poses: BothPoses, truth: Truth) -> PoseError:
 
 
 def squared_mahalanobis(belief: Belief, sighting: Sighting, truth: Truth) -> float:
-    """How many standard deviations, squared, the truth lies from what a belief reports.
+    """Squared Mahalanobis distance of the truth from a belief.
 
-    It is told where the particles live: at the camera that the surface was seen from.
+    The error is that of the particles: at the camera that the surface was seen from.
 
     Returns:
         d^T P^-1 d of the horizontal error d and the particles' covariance P; infinite where
-        they are all in one line or place, so that they leave nothing else possible.
+        all particles are in one line or place.
     """
     position_mav = sighting.surface.T_mav_camera.translation
     true_position = true_T_ground_mav(sighting, truth) @ position_mav
@@ -109,7 +109,7 @@ def surface_error(
 
     Args:
         depth: (height, width) [m], NaN where missing.
-        camera: The camera that the pipeline believes in, wrong calibration and all.
+        camera: Nominal camera of the pipeline, with its calibration errors.
         T_world_camera: Where the reference view truly was, so that errors of the poses'
             drift do not count here.
         truth: The scene.

@@ -118,7 +118,7 @@ def _times(runs: Sequence[Run]) -> Iterator[ReportFigure]:
         return
     machines = {(run.summary.machine.cpu, run.summary.machine.cores) for run in runs}
     caveat = (
-        "The machines differ, so these ratios say nothing about the code."
+        "The machines differ, so these ratios do not measure the code."
         if len(machines) > 1
         else "All runs name the same kind of machine; its load at the time is unknown."
     )

@@ -1,4 +1,4 @@
-"""`compare.html`: one self-contained page that says what changed between runs."""
+"""`compare.html`: one self-contained page of the changes between runs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PAGE = "compare.html"
 
 @dataclass(frozen=True)
 class Section:
-    """What the page says of one run, beside the figures."""
+    """What the page states of one run, beside the figures."""
 
     name: str
     outcome: str
@@ -61,8 +61,8 @@ def write_comparison(out: Path, helds: Sequence[Against]) -> None:
         sections=[Section.of(held) for held in helds],
         overview=overview_table(helds) if len(helds) > 1 else None,
         pictures=[saved_picture(drawn, out) for drawn in comparison_figures(helds)],
-        differing=difference_table(runs),
-        common=common_table(runs),
+        differing=conditions_table(runs, common=False),
+        common=conditions_table(runs, common=True),
     )
     (out / PAGE).write_text(page, encoding="utf-8")
 
@@ -84,20 +84,10 @@ def overview_table(helds: Sequence[Against]) -> TextTable:
     rows = []
     for judged in zip(*(held.comparison.judged for held in helds), strict=True):
         if judged[0].metric.name in moved:
-            told = [cells(one) for one in judged]
-            rows.append((told[0][0], told[0][1], *(f"{row[2]}\n{row[-1]}" for row in told)))
+            found = [cells(one) for one in judged]
+            rows.append((*found[0][:2], *(f"{row[2]}\n{row[-1]}" for row in found)))
     names = [helds[0].reference.name, *(held.run.name for held in helds)]
     return TextTable(("metric", *names), tuple(rows))
-
-
-def difference_table(runs: Sequence[Run]) -> TextTable:
-    """Conditions and parameters in which the runs differ."""
-    return _in_common(runs, common=False)
-
-
-def common_table(runs: Sequence[Run]) -> TextTable:
-    """Conditions that all runs share."""
-    return _in_common(runs, common=True)
 
 
 @dataclass(frozen=True)
@@ -105,9 +95,9 @@ class FailuresMoved:
     """Failures of a run beside those of the reference, over the same flights.
 
     Attributes:
-        appeared: Those that only the run has.
-        went: Those that only the reference has.
-        stayed: How many both have.
+        appeared: Failures of the run only.
+        went: Failures of the reference only.
+        stayed: Number of failures of both.
     """
 
     appeared: list[Failure]
@@ -116,7 +106,7 @@ class FailuresMoved:
 
 
 def failures_moved(held: Against) -> FailuresMoved:
-    """What failed on one side only."""
+    """Failures of one side only."""
     before, after = (
         {failure.key: failure for failure in failures(run.on(held.shared))}
         for run in (held.reference, held.run)
@@ -139,17 +129,14 @@ def _verdicts(held: Against, judged: list[Judged]) -> TextTable:
     return TextTable(header, tuple((row[0], row[-1], *row[1:-1]) for row in rows))
 
 
-def _in_common(runs: Sequence[Run], common: bool) -> TextTable:
-    columns = [_conditions(run) | _parameters(run) for run in runs]
+def conditions_table(runs: Sequence[Run], common: bool) -> TextTable:
+    """Conditions that all runs share, or conditions and parameters in which they differ."""
+    columns = [_conditions(run) if common else _conditions(run) | _parameters(run) for run in runs]
     rows = []
     for name in columns[0]:
         values = [column[name] for column in columns]
-        if (len(set(values)) == 1) != common:
-            continue
-        if not common:
-            rows.append((name, *values))
-        elif name in _conditions(runs[0]):
-            rows.append((name, values[0]))
+        if (len(set(values)) == 1) == common:
+            rows.append((name, *(values[:1] if common else values)))
     names = ("all runs",) if common else tuple(run.name for run in runs)
     return TextTable(("", *names), tuple(rows))
 

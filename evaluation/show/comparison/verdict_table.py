@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from xml.etree import ElementTree
+
 import numpy as np
 from rich.console import Console
 
@@ -20,6 +22,8 @@ STYLES = {
     Verdict.SINGLE: "dim",
     Verdict.UNMEASURED: "dim",
 }
+SKIPPED = (Verdict.SINGLE, Verdict.UNMEASURED)
+"""Verdicts that JUnit shows as skipped."""
 
 
 def cells(judged: Judged) -> tuple[str, ...]:
@@ -95,12 +99,43 @@ def markdown(comparison: Comparison) -> str:
     if moved:
         lines += [*_markdown_table(moved), ""]
     if rest:
-        lines += [
-            "<details><summary>No difference seen, no verdict possible, or not measured</summary>",
-            "",
-        ]
-        lines += [*_markdown_table(rest), "", "</details>", ""]
+        summary = "No difference seen, no verdict possible, or not measured"
+        lines += [f"<details><summary>{summary}</summary>", "", *_markdown_table(rest), ""]
+        lines += ["</details>", ""]
     return "\n".join([*lines, _escaped(conditions(comparison)), ""])
+
+
+def junit(comparison: Comparison) -> str:
+    """An XML document: a metric that got worse is a failure, one without a verdict is skipped."""
+    suite = ElementTree.Element(
+        "testsuite",
+        name="airground check",
+        tests=str(len(comparison.judged)),
+        failures=str(len(comparison.of(Verdict.WORSE))),
+        skipped=str(sum(one.verdict in SKIPPED for one in comparison.judged)),
+        errors="0",
+    )
+    for judged in comparison.judged:
+        suite.append(_case(judged))
+    output = ElementTree.SubElement(suite, "system-out")
+    output.text = f"{conclusion(comparison)}. {conditions(comparison)}"
+    suites = ElementTree.Element("testsuites")
+    suites.append(suite)
+    ElementTree.indent(suites)
+    return ElementTree.tostring(suites, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _case(judged: Judged) -> ElementTree.Element:
+    case = ElementTree.Element("testcase", classname="airground", name=judged.metric.name)
+    text = "; ".join(f"{name}: {cell}" for name, cell in zip(HEADER, cells(judged), strict=True))
+    if judged.verdict == Verdict.WORSE:
+        failure = ElementTree.SubElement(case, "failure", message=text, type="worse")
+        failure.text = f"{text}; what matters: {judged.metric.why}"
+    elif judged.verdict in SKIPPED:
+        ElementTree.SubElement(case, "skipped", message=text)
+    else:
+        ElementTree.SubElement(case, "system-out").text = text
+    return case
 
 
 def _markdown_table(rows: list[Judged]) -> list[str]:

@@ -1,1 +1,1 @@
-"""`report.html`: tables, figures with captions, and what they say."""
+"""`report.html`: headline numbers, tables, and figures with captions."""

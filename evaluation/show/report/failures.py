@@ -107,7 +107,7 @@ def _failed_sequences(table: ResultTable) -> Iterator[Failure]:
             int(sequence),
             result,
             said[judged - 1],
-            TextTable(("aerial map", "error", "spread", "said"), steps),
+            TextTable(("aerial map", "error", "spread", "result"), steps),
         )
 
 

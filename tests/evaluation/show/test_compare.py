@@ -19,8 +19,7 @@ from evaluation.setup.settings import with_value, write_config
 from evaluation.show.comparison.figures import comparison_figures
 from evaluation.show.comparison.page import (
     PAGE,
-    common_table,
-    difference_table,
+    conditions_table,
     failures_moved,
     moved_table,
     overview_table,
@@ -108,11 +107,11 @@ def test_differences_of_parameters_machine_and_code_are_listed(before: Run) -> N
     config = with_value(Config(), "localization", "particles", 77, "test")
     other = replace(INFO, cpu="another CPU", git_revision="def456")
     runs = [before, made_run("after", before.table, other, config)]
-    differing = {row[0]: row[1:] for row in difference_table(runs).rows}
+    differing = {row[0]: row[1:] for row in conditions_table(runs, common=False).rows}
     assert differing["localization.particles"][1] == "77"
     assert differing["machine"] == ("some CPU, 2 cores", "another CPU, 2 cores")
     assert set(differing) == {"localization.particles", "machine", "code"}
-    assert "seeds of the flights" in {row[0] for row in common_table(runs).rows}
+    assert "seeds of the flights" in {row[0] for row in conditions_table(runs, common=True).rows}
 
 
 def test_several_runs_stand_in_one_overview(before: Run) -> None:
