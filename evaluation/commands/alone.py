@@ -52,7 +52,7 @@ class AloneWords:
         from airground.core.cloud import Source
         from airground.io.open_recording import open_robot
         from airground.slam import front_ends
-        from evaluation.run.alone import print_alone, run_alone, write_alone
+        from evaluation.run.own_recordings import print_alone, run_alone, write_alone
         from evaluation.setup.output import fresh_folder
         from evaluation.table.true_camera import true_camera
 

@@ -87,7 +87,7 @@ class OwnWords:
         from airground.core.cloud import Source
         from airground.io.open_recording import open_robot
         from airground.io.robot_recording import Pair
-        from evaluation.run.pair import print_pair, run_pair, write_pair
+        from evaluation.run.own_recordings import print_pair, run_pair, write_pair
         from evaluation.setup.output import fresh_folder
         from evaluation.setup.settings import write_config
 

@@ -9,17 +9,16 @@ from pathlib import Path
 
 from airground.augmentation import AugmentedMap
 from airground.core.belief import Alignment, Belief
+from airground.core.cloud import Source
 from airground.core.events import Aligned, BeliefUpdated
 from airground.core.se3 import SE3
 from airground.core.sighting import Sighting
-from airground.core.trajectory import Trajectory
 from airground.io.ply import write_ply
 from airground.io.recording import Recording
-from airground.io.tum import write_tum
 from evaluation.run.driver import Driven, drive, pipeline_for
 from evaluation.run.drops import DropList
 from evaluation.run.onlooker import STAGE_OF, Onlooker, Seen
-from evaluation.run.tracking import TrackingHere, TrackingTask, localizer_rng
+from evaluation.run.tracking import TrackingHere, TrackingTask, localizer_rng, write_paths
 from evaluation.run.tracking_apart import TrackingApart
 from evaluation.setup.setups import Setup
 from evaluation.table.row_writer import RowWriter
@@ -145,25 +144,10 @@ class RunRows:
 
 
 def write_run(folder: Path, recording: Recording, result: RunResult) -> None:
-    """Write `augmented_map.ply` and the robots' trajectories."""
+    """Write `augmented_map.ply`, and `ROBOT.tum` and `ROBOT_live.tum` with poses of the bodies."""
     augmented = result.augmented
     write_ply(folder / "augmented_map.ply", augmented.cloud_ground, augmented.sources)
-    write_trajectories(folder, recording, result.tracked)
-
-
-def write_trajectories(folder: Path, recording: Recording, tracked: dict[str, Tracked]) -> None:
-    """Write `mav.tum` and `ground.tum` (final poses) and `*_live.tum` (poses as first given).
-
-    Poses are those of the robot's body, as in the recording's `truth/`, so that `evo_ape tum`
-    compares the files as they are. A robot without poses has no file.
-    """
-    calibrations = {"mav": recording.mav.calibration, "ground": recording.ground.calibration}
-    for robot, calibration in calibrations.items():
-        T_camera_body = (calibration.T_body_imu @ calibration.T_imu_camera).inverse()
-        ways = {robot: tracked[robot].final_poses()}
-        ways[f"{robot}_live"] = tracked[robot].front_end.live_poses()
-        for name, poses in ways.items():
-            if poses:
-                bodies = [T_map_camera @ T_camera_body for _, T_map_camera in poses]
-                path = Trajectory.from_poses([stamp for stamp, _ in poses], bodies)
-                write_tum(folder / f"{name}.tum", path)
+    for name, tracked in result.tracked.items():
+        write_paths(
+            folder, name, recording.of(Source[name.upper()]), tracked.front_end, tracked.final
+        )

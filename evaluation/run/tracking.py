@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -11,13 +12,14 @@ import numpy as np
 from airground.core.messages import Stamped
 from airground.core.trajectory import Trajectory
 from airground.core.work_ahead import run_ahead
-from airground.io.robot_recording import Pair
+from airground.io.robot_recording import Pair, RobotRecording
+from airground.io.tum import write_tum
 from airground.slam.warm_up import warm_up_slam
 from airground.tracking import TrackedFrame, Trackers
 from evaluation.run.drops import DropList
 from evaluation.run.front_ends import front_ends_for
 from evaluation.setup.setups import Setup
-from evaluation.table.tracking_log import Tracked
+from evaluation.table.tracking_log import FrontEndLog, Tracked
 
 if TYPE_CHECKING:
     from sim.recording.truth import Truth
@@ -129,3 +131,27 @@ def localizer_rng(seed: int, flight: int, sequence: int = 0) -> np.random.Genera
             pipeline's sightings from a later start.
     """
     return np.random.default_rng([seed, flight, 1, sequence])
+
+
+def live_path(log: FrontEndLog) -> Trajectory | None:
+    """Poses as first given, camera in map; None without any."""
+    poses = log.live_poses()
+    if not poses:
+        return None
+    return Trajectory.from_poses([stamp for stamp, _ in poses], [pose for _, pose in poses])
+
+
+def write_paths(
+    folder: Path, name: str, recording: RobotRecording, log: FrontEndLog, final: Trajectory | None
+) -> None:
+    """Write `NAME.tum` (final poses) and `NAME_live.tum` (poses as first given), where any.
+
+    Poses are those of `recording.pose_frame`, the frame whose truth the publisher states, so that
+    `evo_ape tum` compares the files as they are.
+    """
+    T_camera_pose = recording.T_pose_camera.inverse()
+    for file, path in ((name, final), (f"{name}_live", live_path(log))):
+        if path is not None:
+            poses = [path[index] @ T_camera_pose for index in range(len(path))]
+            written = Trajectory.from_poses(path.stamps_ns.tolist(), poses)
+            write_tum(folder / f"{file}.tum", written)

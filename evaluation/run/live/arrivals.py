@@ -1,4 +1,4 @@
-"""The mapper's ear: frames of both robots in order of time, though they come as they come."""
+"""The mapper's inputs: frames of both robots, merged into order of time as they arrive."""
 
 from __future__ import annotations
 
@@ -15,20 +15,22 @@ from evaluation.run.live.playback import Clock
 from evaluation.run.live.radio_link import Envelope
 
 POLL_S = 0.02
+"""Longest wait for a message before both channels are read again: less than a frame at 30 Hz."""
+
 GIVE_UP_S = 120.0
-"""When nobody has anything to tell, a robot may take so long to finish its own map."""
+"""Longest silence of both robots: SLAM may take that long to adjust its final map."""
 
 
 class Stream:
-    """What one robot sends.
+    """Messages of one robot.
 
     Args:
         receiver: The channel.
         is_alive: Whether the robot's process still runs.
 
     Attributes:
-        final: The robot's path as believed at last, once it has told.
-        late_ns: Stamps of frames that came after the mapper had gone on without them.
+        final: Final trajectory of the robot; None before it arrived.
+        late_ns: Stamps of frames that arrived after a newer frame was taken [ns].
     """
 
     def __init__(self, receiver: Receiver, is_alive: Callable[[], bool]) -> None:
@@ -39,9 +41,9 @@ class Stream:
         self.final: Trajectory | None = None
         self.late_ns: list[int] = []
 
-    def listen(self) -> None:
-        """Take in what has come."""
-        alive = self._is_alive()  # asked first, so that a robot's last words are heard
+    def read(self) -> None:
+        """Read all messages that the channel holds."""
+        alive = self._is_alive()  # before reading, so that a process's last messages are read
         while (message := self._receiver.receive()) is not None:
             envelope, parts = Envelope.of(message), message[1:]
             if envelope.last:
@@ -51,17 +53,17 @@ class Stream:
         self._ended |= not alive
 
     def stamp_ns(self, now_ns: int) -> int | None:
-        """Of the next frame; None while it has not crossed the radio."""
+        """Stamp of the next frame [ns]; None until it has crossed the radio."""
         if self._waiting and self._waiting[0][0].arrives_ns <= now_ns:
             return self._waiting[0][0].stamp_ns
         return None
 
-    def over(self) -> bool:
-        """Whether nothing more will come."""
+    def has_ended(self) -> bool:
+        """Whether no further frame will arrive."""
         return self._ended and not self._waiting
 
     def take(self, newest: tuple[int, Source]) -> TrackedFrame | None:
-        """The next frame; None where it came too late to be put in order behind the newest."""
+        """The next frame; None if it is older than the newest frame taken."""
         _, parts = self._waiting.popleft()
         self._receiver.acknowledge()
         frame = unpack(parts)
@@ -72,47 +74,47 @@ class Stream:
         return self._hand_over.pass_on(frame)
 
     def wait(self, seconds: float) -> None:
-        """Until something comes, but not for long."""
+        """Wait for a message, at most this long [s]."""
         self._receiver.wait(seconds)
 
 
 def in_order(
     streams: Mapping[Source, Stream], clock: Clock, patience_s: float
 ) -> Iterator[TrackedFrame]:
-    """Frames by their stamps, the ground robot's first where they are equal.
+    """Frames by their stamps, the ground robot's first where stamps are equal.
 
-    A frame waits until the other robot's next one is there, since that may be older. A robot
-    that is silent for too long is not waited for until it speaks again; what it sends of
-    the time before is too late.
+    A frame waits for the other robot's next frame, which may be older. After `patience_s` without
+    it, the other robot counts as silent and no frame waits for it until it sends again; its frames
+    that are older than the newest frame taken are late.
 
     Args:
-        streams: Of both robots.
-        clock: Says what has crossed the radio.
-        patience_s: How long one robot is waited for.
+        streams: Messages of each robot.
+        clock: Clock by which messages cross the radio.
+        patience_s: Longest wait for one robot [s].
     """
     newest = (-1, Source.GROUND)
     silent: set[Source] = set()
-    waiting_since = heard = time.monotonic()
+    waiting_since = last_taken = time.monotonic()
     while True:
         for stream in streams.values():
-            stream.listen()
+            stream.read()
         now_ns, now_s = clock.now_ns(), time.monotonic()
         heads = {robot: stream.stamp_ns(now_ns) for robot, stream in streams.items()}
-        come = {robot: stamp for robot, stamp in heads.items() if stamp is not None}
-        silent -= come.keys()
-        missing = [r for r, stream in streams.items() if r not in come and not stream.over()]
-        if not come and (not missing or now_s - heard > GIVE_UP_S):
+        ready = {robot: stamp for robot, stamp in heads.items() if stamp is not None}
+        silent -= ready.keys()
+        missing = [r for r, stream in streams.items() if r not in ready and not stream.has_ended()]
+        if not ready and (not missing or now_s - last_taken > GIVE_UP_S):
             return
-        if not come:
+        if not ready:
             waiting_since = now_s
         elif now_s - waiting_since > patience_s:
             silent.update(missing)
-        if not come or not silent.issuperset(missing):
+        if not ready or not silent.issuperset(missing):
             streams[missing[0]].wait(POLL_S)
             continue
-        key = min((stamp, robot) for robot, stamp in come.items())
+        key = min((stamp, robot) for robot, stamp in ready.items())
         frame = streams[key[1]].take(newest)
         if frame is not None:
             newest = key
             yield frame
-        waiting_since = heard = time.monotonic()
+        waiting_since = last_taken = time.monotonic()

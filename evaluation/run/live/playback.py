@@ -1,34 +1,39 @@
-"""How a recording is played at its own rate: the clock, and the limits of the playback."""
+"""Playback of one robot's recording at its own rate: clock, bounded queue, tracking, hand-over."""
 
 from __future__ import annotations
 
 import time
+from collections import deque
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+from airground.core.cloud import Source
+from airground.io.recording import Recording
+from airground.tracking import RobotTracker, TrackedFrame
 from evaluation.run.live.radio_link import RadioLimits
 
 
 class Clock(Protocol):
-    """Tells the time by the recording's stamps."""
+    """A clock that shows recorded time."""
 
     def now_ns(self) -> int:
-        """The stamp that an image taken now would have."""
+        """Stamp of an image taken now [ns]."""
 
     def wait_until(self, stamp_ns: int) -> None:
-        """Come back when it is `stamp_ns`, at once where that is past."""
+        """Return at `stamp_ns`; at once if that is past."""
 
 
 @dataclass(frozen=True)
 class PlaybackClock:
-    """Recorded time that passes as the machine's does, or by a factor faster.
+    """Recorded time, passing `rate` times as fast as the system's monotonic clock.
 
-    All processes of a machine share it: it stands on the system's monotonic clock.
+    All processes of a machine share that clock.
 
     Attributes:
-        first_ns: The recording's first stamp.
-        started_ns: When that was due, by the monotonic clock.
-        rate: Recorded seconds in one second.
+        first_ns: First stamp of the recording [ns].
+        started_ns: Time of that stamp on the monotonic clock [ns].
+        rate: Recorded seconds per second.
     """
 
     first_ns: int
@@ -36,34 +41,34 @@ class PlaybackClock:
     rate: float
 
     def now_ns(self) -> int:
-        """The stamp that an image taken now would have."""
+        """As `Clock.now_ns`."""
         return self.first_ns + round((time.monotonic_ns() - self.started_ns) * self.rate)
 
     def wait_until(self, stamp_ns: int) -> None:
-        """Sleep until it is `stamp_ns`."""
+        """As `Clock.wait_until`."""
         due_ns = self.started_ns + (stamp_ns - self.first_ns) / self.rate
         seconds = (due_ns - time.monotonic_ns()) * 1e-9
         if seconds > 0:
             time.sleep(seconds)
 
     def passed_ms(self, since_ns: int, until_ns: int) -> float:
-        """How long a span of recorded time took here [ms]."""
+        """Real duration of a span of recorded time [ms]."""
         return (until_ns - since_ns) * 1e-6 / self.rate
 
 
 @dataclass(frozen=True)
 class Playback:
-    """How a recording is played.
+    """Rate and limits of a live run.
 
     Attributes:
-        rate: Recorded seconds in one second.
-        waiting_frames: How many images may wait before each tracker, 30 being a second at 30 Hz:
-            adjusting a whole map of ten minutes takes two thirds of that, and what has waited is
-            tracked several times as fast as it came.
-        frames_under_way: How many tracked frames of each robot may wait before the mapper:
-            five seconds at 30 Hz, some 360 MiB when all of it is full.
-        radio: What lies between the MAV and the ground robot; None for one computer.
-        patience_s: How long the mapper waits for a robot that is silent.
+        rate: Recorded seconds per second.
+        waiting_frames: Capacity of the queue before each tracker, in images. 30 are one second at
+            30 Hz: adjusting the map of ten minutes takes two thirds of that, and the tracker
+            works off its queue several times as fast as images arrive.
+        frames_under_way: Capacity of the queue before the mapper, in tracked frames per robot:
+            five seconds at 30 Hz, 360 MiB when full.
+        radio: Limits of the radio from the MAV to the mapper; None on one computer.
+        patience_s: Time that the mapper waits for a silent robot [s].
     """
 
     rate: float = 1.0
@@ -73,11 +78,109 @@ class Playback:
     patience_s: float = 2.0
 
     def describe(self) -> str:
-        """For labels: how this differs from a run that takes its time."""
+        """Label: how this run differs from a run offline."""
         played = "live" if self.rate == 1.0 else f"live, played {self.rate:g} times as fast"
         return played if self.radio is None else f"{played}, radio: {self.radio.describe()}"
 
     @property
     def jpeg_quality(self) -> int | None:
-        """Of the MAV's images as the mapper gets them; None where they are not compressed."""
+        """JPEG quality of the MAV's images at the mapper; None if not compressed."""
         return None if self.radio is None else self.radio.jpeg_quality
+
+
+class FrameQueue:
+    """A bounded queue of frames that arrive by the clock; a frame that finds it full is dropped.
+
+    Args:
+        stamps_ns: Arrival times of the frames, in order [ns].
+        capacity: Number of frames that may wait, besides the one being tracked.
+
+    Attributes:
+        dropped: Indices of the dropped frames.
+        longest: Largest number of frames that waited.
+    """
+
+    def __init__(self, stamps_ns: Sequence[int], capacity: int) -> None:
+        self._stamps_ns, self._capacity = stamps_ns, capacity
+        self._waiting: deque[int] = deque()
+        self._next = 0
+        self.dropped: list[int] = []
+        self.longest = 0
+
+    def take(self, now_ns: int) -> int | None:
+        """Index of the next frame to track, arrived or not; None after the last."""
+        while self._next < len(self._stamps_ns) and self._stamps_ns[self._next] <= now_ns:
+            if len(self._waiting) < self._capacity:
+                self._waiting.append(self._next)
+            else:
+                self.dropped.append(self._next)
+            self._next += 1
+        self.longest = max(self.longest, len(self._waiting))
+        if self._waiting:
+            return self._waiting.popleft()
+        if self._next == len(self._stamps_ns):
+            return None
+        self._next += 1
+        return self._next - 1
+
+
+@dataclass(frozen=True)
+class Played:
+    """Outcome of one robot's playback.
+
+    Attributes:
+        posed_ns: Time at which each tracked image had its pose, by the image's stamp [ns].
+        dropped_ns: Stamps of the dropped images [ns].
+        longest_queue: Largest number of images that waited.
+        processor_s: Processor time of the playback [s].
+    """
+
+    posed_ns: dict[int, int]
+    dropped_ns: list[int]
+    longest_queue: int
+    processor_s: float
+
+
+def play(
+    recording: Recording,
+    robot: Source,
+    tracker: RobotTracker,
+    clock: Clock,
+    capacity: int,
+    hand_over: Callable[[TrackedFrame], None],
+) -> Played:
+    """Track one robot's images as they arrive by the clock.
+
+    A file is decoded before its image is due wherever there is time, since a camera delivers
+    pixels. The inertial samples before a dropped image are tracked with the next image.
+
+    Args:
+        recording: Recording of both robots.
+        robot: The robot to play.
+        tracker: Tracker of that robot.
+        clock: Clock of the playback.
+        capacity: Number of images that may wait.
+        hand_over: Receives each frame that has its pose; must not block.
+    """
+    own = recording.of(robot)
+    stamps_ns = own.camera_stamps.tolist()
+    queue = FrameQueue(stamps_ns, capacity)
+    bundler = own.bundler()
+    posed_ns = {}
+    started_s = time.process_time()
+    while (index := queue.take(clock.now_ns())) is not None:
+        image = own.read_image(index)
+        clock.wait_until(image.stamp_ns)
+        *samples, last = bundler.bundle(image)
+        for stamped in samples:
+            tracker.add(stamped.message)
+        frame = tracker.add(last.message)
+        assert frame is not None
+        posed_ns[image.stamp_ns] = clock.now_ns()
+        hand_over(frame)
+    return Played(
+        posed_ns,
+        [stamps_ns[index] for index in queue.dropped],
+        queue.longest,
+        time.process_time() - started_s,
+    )

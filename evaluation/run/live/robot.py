@@ -10,8 +10,7 @@ import numpy as np
 
 from airground.core.trajectory import Trajectory
 from airground.link.channel import Sender
-from evaluation.run.live.playback import PlaybackClock
-from evaluation.run.live.player import Played, play
+from evaluation.run.live.playback import PlaybackClock, Played, play
 from evaluation.run.live.radio_link import Radio, RadioLimits, Uplink
 from evaluation.run.robot_process import READY, RobotTask, open_tracker
 from evaluation.setup.environment import settle
@@ -45,10 +44,10 @@ class RobotReport:
     Attributes:
         log: Answers of its front end, image by image.
         final: Its final trajectory; None where it has none.
-        played: Poses, dropped images and times of the playback.
-        shed_ns: Stamps of frames for which the mapper had no room.
-        lost_ns: Stamps of frames that the radio lost.
-        sent_bytes: Bytes sent.
+        played: Outcome of the playback.
+        shed_ns: Stamps of frames for which the mapper had no room [ns].
+        lost_ns: Stamps of frames that the radio lost [ns].
+        sent_bytes: Size of all frames sent, lost ones included.
         most_under_way: Largest number of frames that waited before the mapper.
         peak_memory_mib: Peak memory of the process [MiB].
     """
@@ -68,12 +67,10 @@ def play_robot(order: LiveTask, pipe: Connection) -> None:
     task = order.task
     recording, watched, tracker = open_tracker(task)
     if task.robot.name.lower() in task.setup.slam_robots():
-        # SLAM imports it when a loop closes, which would delay live poses.
+        # Imported here, since SLAM's import at its first closed loop would delay live poses.
         importlib.import_module("open3d")
     settle()
-    radio = None
-    if order.radio is not None:
-        radio = Radio(order.radio, np.random.default_rng([task.seed, 1]))
+    radio = Radio(order.radio or RadioLimits(), np.random.default_rng([task.seed, 1]))
     sender = Sender(order.address, order.frames_under_way)
     uplink = Uplink(sender, radio, order.radio.jpeg_quality if order.radio else None)
     pipe.send(READY)
@@ -87,7 +84,7 @@ def play_robot(order: LiveTask, pipe: Connection) -> None:
         played=played,
         shed_ns=uplink.shed,
         lost_ns=uplink.lost,
-        sent_bytes=uplink.sent_bytes,
+        sent_bytes=radio.carried_bytes,
         most_under_way=sender.most_under_way,
         peak_memory_mib=peak_memory_mib(),
     )

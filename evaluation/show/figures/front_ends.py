@@ -22,7 +22,7 @@ from airground.io.open_recording import open_robot
 from airground.io.robot_recording import RobotRecording
 from airground.slam import front_ends
 from airground.slam.front_end import FrontEnd
-from evaluation.run.alone import run_alone
+from evaluation.run.own_recordings import run_alone
 from evaluation.show.figures.style import PICTURE_DPI, SERIES, WIDE_IN, styled
 from evaluation.table.tracked_share import tracked_share_of
 from evaluation.table.trajectory_error import aligned_errors
@@ -83,16 +83,17 @@ def front_end_error(recording: RobotRecording, name: str, config: Config) -> Fro
     else:
         front_end = front_ends.make_front_end(front_ends.GROUND, name, given)
     result = run_alone(recording, front_end)
-    live = result.live
-    stamps = [] if live is None else live.stamps_ns.tolist()
-    poses = [(stamp, live[i]) for i, stamp in enumerate(stamps) if live is not None]
-    truth = {stamp: true for stamp, _ in poses if (true := true_pose(stamp)) is not None}
+    truth = {
+        stamp: true
+        for stamp, _ in result.log.live_poses()
+        if (true := true_pose(stamp)) is not None
+    }
     if len(truth) < 3:
         raise InputError(f"{name}: gave {len(truth)} poses with known truth, at least 3 needed")
-    known = [(stamp, pose) for stamp, pose in poses if stamp in truth]
+    known = [(stamp, pose) for stamp, pose in result.log.live_poses() if stamp in truth]
     errors = aligned_errors(known, truth.__getitem__)
     time_s = (np.array(list(truth)) - recording.camera_stamps[0]) * 1e-9
-    share = tracked_share_of(recording, result.tracked, true_pose)
+    share = tracked_share_of(recording, result.log.answers, true_pose)
     return FrontEndError(name, time_s, errors, share.fraction)
 
 

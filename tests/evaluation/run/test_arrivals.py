@@ -1,4 +1,4 @@
-"""Frames of two robots, put in order as they come."""
+"""Frames of two robots, merged into order of time as they arrive."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from airground.link.frame_codec import pack, pack_trajectory
 from airground.tracking import TrackedFrame
 from evaluation.run.live.arrivals import Stream, in_order
 from evaluation.run.live.radio_link import Envelope
-from tests.evaluation.run.lives import SteppedClock
+from tests.evaluation.run.played_robots import SteppedClock
 from tests.frames import ground_frame, mav_frame, path
 
 
 @dataclass
-class Speaker:
-    """A robot that says what it is told to say."""
+class ScriptedRobot:
+    """A robot that sends the frames that the test gives it."""
 
     alive: bool = True
     receiver: Receiver = field(default_factory=Receiver)
@@ -28,10 +28,10 @@ class Speaker:
         self.sender = Sender(self.receiver.address, 100)
         self.stream = Stream(self.receiver, lambda: self.alive)
 
-    def say(self, frame: TrackedFrame, arrives_ns: int = 0) -> None:
+    def send(self, frame: TrackedFrame, arrives_ns: int = 0) -> None:
         self.sender.send(Envelope(False, frame.stamp_ns, arrives_ns).around(pack(frame)))
         assert self.receiver.wait(5)
-        self.stream.listen()
+        self.stream.read()
 
     def end(self) -> None:
         self.sender.send(Envelope(True, 0, 0).around(pack_trajectory(path(2))))
@@ -42,67 +42,69 @@ class Speaker:
 
 
 @pytest.fixture
-def robots() -> Iterator[dict[Source, Speaker]]:
-    made = {robot: Speaker() for robot in Source}
+def robots() -> Iterator[dict[Source, ScriptedRobot]]:
+    made = {robot: ScriptedRobot() for robot in Source}
     yield made
     for one in made.values():
         one.close()
 
 
-def heard(
-    robots: dict[Source, Speaker], clock: SteppedClock, patience_s: float = 30.0
+def taken(
+    robots: dict[Source, ScriptedRobot], clock: SteppedClock, patience_s: float = 30.0
 ) -> Iterator[tuple[str, int]]:
     streams = {robot: one.stream for robot, one in robots.items()}
     for frame in in_order(streams, clock, patience_s):
         yield frame.robot.name, frame.stamp_ns
 
 
-def test_frames_come_by_their_stamps_the_ground_robots_first(
-    robots: dict[Source, Speaker],
+def test_frames_are_ordered_by_stamp_the_ground_robots_first(
+    robots: dict[Source, ScriptedRobot],
 ) -> None:
     for stamp in (10, 20, 30):
-        robots[Source.MAV].say(mav_frame(stamp))
+        robots[Source.MAV].send(mav_frame(stamp))
     for stamp in (5, 20, 25):
-        robots[Source.GROUND].say(ground_frame(stamp))
+        robots[Source.GROUND].send(ground_frame(stamp))
     for one in robots.values():
         one.end()
     order = [("GROUND", 5), ("MAV", 10), ("GROUND", 20), ("MAV", 20), ("GROUND", 25), ("MAV", 30)]
-    assert list(heard(robots, SteppedClock())) == order
+    assert list(taken(robots, SteppedClock())) == order
     assert robots[Source.GROUND].stream.final is not None
 
 
-def test_a_silent_robot_is_not_waited_for_and_its_late_frames_are_counted(
-    robots: dict[Source, Speaker],
+def test_a_silent_robot_delays_no_frame_and_its_late_frames_are_counted(
+    robots: dict[Source, ScriptedRobot],
 ) -> None:
-    robots[Source.GROUND].say(ground_frame(5))
-    robots[Source.GROUND].say(ground_frame(20))
-    frames = heard(robots, SteppedClock(), patience_s=0.05)
+    robots[Source.GROUND].send(ground_frame(5))
+    robots[Source.GROUND].send(ground_frame(20))
+    frames = taken(robots, SteppedClock(), patience_s=0.05)
     assert [next(frames), next(frames)] == [("GROUND", 5), ("GROUND", 20)]
-    robots[Source.MAV].say(mav_frame(10))
-    robots[Source.MAV].say(mav_frame(30))
+    robots[Source.MAV].send(mav_frame(10))
+    robots[Source.MAV].send(mav_frame(30))
     for one in robots.values():
         one.end()
     assert list(frames) == [("MAV", 30)]
     assert robots[Source.MAV].stream.late_ns == [10]
 
 
-def test_a_dead_robot_is_no_longer_waited_for(robots: dict[Source, Speaker]) -> None:
-    robots[Source.MAV].say(mav_frame(10))
+def test_a_dead_robot_delays_no_frame(robots: dict[Source, ScriptedRobot]) -> None:
+    robots[Source.MAV].send(mav_frame(10))
     robots[Source.MAV].alive = False
     for stamp in (5, 20):
-        robots[Source.GROUND].say(ground_frame(stamp))
+        robots[Source.GROUND].send(ground_frame(stamp))
     robots[Source.GROUND].end()
     order = [("GROUND", 5), ("MAV", 10), ("GROUND", 20)]
-    assert list(heard(robots, SteppedClock())) == order
+    assert list(taken(robots, SteppedClock())) == order
 
 
-def test_what_is_still_in_the_air_has_not_come(robots: dict[Source, Speaker]) -> None:
+def test_a_frame_is_ready_after_crossing_the_radio(
+    robots: dict[Source, ScriptedRobot],
+) -> None:
     clock = SteppedClock()
-    robots[Source.MAV].say(mav_frame(10), arrives_ns=1000)
+    robots[Source.MAV].send(mav_frame(10), arrives_ns=1000)
     assert robots[Source.MAV].stream.stamp_ns(999) is None
     assert robots[Source.MAV].stream.stamp_ns(1000) == 10
-    robots[Source.GROUND].say(ground_frame(20))
-    frames = heard(robots, clock, patience_s=0.05)
+    robots[Source.GROUND].send(ground_frame(20))
+    frames = taken(robots, clock, patience_s=0.05)
     assert next(frames) == ("GROUND", 20)
     clock.wait_until(1000)
     for one in robots.values():

@@ -1,4 +1,4 @@
-"""The list of what a live run did without: written, read back, and refused."""
+"""The drop list of a live run: written, read back, and refused."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def drop_list(recording: Recording) -> DropList:
     )
 
 
-def test_it_comes_back_as_it_was_written(recording: Recording, tmp_path: Path) -> None:
+def test_it_is_read_back_as_written(recording: Recording, tmp_path: Path) -> None:
     made = drop_list(recording)
     path = tmp_path / "dropped.json"
     made.write(path)
@@ -39,7 +39,7 @@ def test_it_comes_back_as_it_was_written(recording: Recording, tmp_path: Path) -
     }
 
 
-def test_that_of_another_recording_is_refused(recording: Recording, tmp_path: Path) -> None:
+def test_a_list_of_another_recording_is_refused(recording: Recording, tmp_path: Path) -> None:
     path = tmp_path / "dropped.json"
     other = drop_list(recording).model_copy(update={"recording": "0" * 64})
     other.write(path)
@@ -56,7 +56,7 @@ def test_that_of_another_recording_is_refused(recording: Recording, tmp_path: Pa
         ('{"schema": 1, "recording": "x", "jpeg_quality": 0}', "jpeg_quality"),
     ],
 )
-def test_what_is_no_list_is_refused(
+def test_a_malformed_list_is_refused(
     text: str, named: str, recording: Recording, tmp_path: Path
 ) -> None:
     path = tmp_path / "dropped.json"

@@ -1,4 +1,4 @@
-"""What reaches the mapper live is what reaches it offline with the same frames left out."""
+"""Frames that reach the mapper live are those of a run offline with the same drop list."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from airground.core.cloud import Source
 from airground.io.recording import Recording
 from evaluation.run.drops import nothing_dropped
 from evaluation.run.live.radio_link import RadioLimits
-from tests.evaluation.run.lives import Robots, offline, packed
+from tests.evaluation.run.played_robots import Robots, offline, packed
 from tests.io.recordings import GROUND_STAMPS, MAV_STAMPS, SAMPLE_STAMPS, write_recording
 
 MS = 1_000_000
@@ -20,9 +20,9 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     return Recording.open(write_recording(tmp_path_factory.mktemp("live") / "recording"))
 
 
-def test_without_drops_it_is_the_run_offline(recording: Recording) -> None:
+def test_without_drops_frames_equal_those_of_a_run_offline(recording: Recording) -> None:
     robots = Robots(recording)
-    robots.live()
+    robots.play()
     frames = robots.received()
     assert [frame.stamp_ns for frame in frames] == sorted([*MAV_STAMPS, *GROUND_STAMPS])
     assert robots.drops() == nothing_dropped(recording)
@@ -32,7 +32,7 @@ def test_without_drops_it_is_the_run_offline(recording: Recording) -> None:
 
 def test_a_slow_tracker_drops_images_and_no_inertial_sample(recording: Recording) -> None:
     robots = Robots(recording, {Source.MAV: 60 * MS})
-    robots.live()
+    robots.play()
     assert robots.played[Source.MAV].dropped_ns == [MAV_STAMPS[1], MAV_STAMPS[3]]
     assert robots.played[Source.GROUND].dropped_ns == []
     seen = robots.front_ends[Source.MAV].imu_stamps
@@ -42,9 +42,9 @@ def test_a_slow_tracker_drops_images_and_no_inertial_sample(recording: Recording
     assert packed(frames) != packed(offline(recording, nothing_dropped(recording)))
 
 
-def test_poses_come_as_late_as_the_tracker_is(recording: Recording) -> None:
+def test_the_latency_of_poses_is_that_of_the_tracker(recording: Recording) -> None:
     robots = Robots(recording, {Source.MAV: 60 * MS}, waiting_frames=4)
-    robots.live()
+    robots.play()
     posed = robots.played[Source.MAV].posed_ns
     late = [posed[stamp] - stamp for stamp in MAV_STAMPS.tolist()]
     assert late[0] == 60 * MS
@@ -52,9 +52,9 @@ def test_poses_come_as_late_as_the_tracker_is(recording: Recording) -> None:
     assert robots.played[Source.MAV].longest_queue == 2
 
 
-def test_a_mapper_that_takes_nothing_stops_no_tracker(recording: Recording) -> None:
+def test_a_full_mapper_blocks_no_tracker(recording: Recording) -> None:
     robots = Robots(recording, frames_under_way=2)
-    robots.live()
+    robots.play()
     assert all(len(played.posed_ns) == 4 for played in robots.played.values())
     assert robots.uplinks[Source.GROUND].shed == GROUND_STAMPS[2:].tolist()
     frames = robots.received()
@@ -62,9 +62,9 @@ def test_a_mapper_that_takes_nothing_stops_no_tracker(recording: Recording) -> N
     assert packed(frames) == packed(offline(recording, robots.drops()))
 
 
-def test_what_the_radio_loses_is_counted_and_can_be_lost_again(recording: Recording) -> None:
+def test_radio_losses_are_counted_and_reproduced_offline(recording: Recording) -> None:
     robots = Robots(recording, radio=RadioLimits(loss=0.5, latency_ms=30, jpeg_quality=70))
-    robots.live()
+    robots.play()
     lost = robots.uplinks[Source.MAV].lost
     assert 0 < len(lost) < 4
     frames = robots.received()

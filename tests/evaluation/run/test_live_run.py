@@ -1,4 +1,4 @@
-"""Live runs as a whole: processes, sockets, their results and their ends."""
+"""Whole live runs: processes, sockets, results, and how they end."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ PATIENCE_S = 60.0
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
-    """Four images a robot, with somebody who knows where they were taken."""
+    """Four images per robot, with their true poses."""
     path = write_recording(tmp_path_factory.mktemp("live") / "recording")
     truth = path / "truth"
     truth.mkdir()
@@ -50,20 +50,20 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     return Recording.open(path)
 
 
-def told(result: RunResult) -> LiveSummary:
+def summarized(result: RunResult) -> LiveSummary:
     summary = live_summary(result.table)
     assert summary is not None
     return summary
 
 
-def test_a_live_run_that_drops_nothing_is_the_run_offline(recording: Recording) -> None:
+def test_a_live_run_without_drops_equals_a_run_offline(recording: Recording) -> None:
     truth = Truth.open(recording.path)
     playback = Playback(rate=1000.0, waiting_frames=100, patience_s=PATIENCE_S)
     live, drops = run_live(recording, truth, SETUP, 0, playback)
     assert drops == nothing_dropped(recording)
     offline = run_recording(recording, truth, SETUP, 0)
     assert_same(live, offline)
-    summary = told(live)
+    summary = summarized(live)
     for one in (summary.mav, summary.ground):
         assert (one.survived, one.images, one.dropped, one.posed_ms.n) == (1, 4, 0, 4)
         assert one.mapped_ms.n == 4
@@ -71,12 +71,12 @@ def test_a_live_run_that_drops_nothing_is_the_run_offline(recording: Recording) 
         assert one.mbit_s > 0
 
 
-def test_a_live_run_that_dropped_much_can_be_had_again(recording: Recording) -> None:
-    """Images come every 33 us, and nobody waits: of each robot's all but the first are late."""
+def test_a_live_run_with_drops_is_reproduced_offline(recording: Recording) -> None:
+    """Images arrive every 33 us and the queue has no room: all but each robot's first may drop."""
     truth = Truth.open(recording.path)
     radio = RadioLimits(loss=1.0)
     live, drops = run_live(recording, truth, SETUP, 0, Playback(1000.0, 0, radio=radio))
-    summary = told(live)
+    summary = summarized(live)
     assert summary.ground.dropped == len(drops.dropped.ground) >= 1
     assert summary.mav.dropped == len(drops.dropped.mav) >= 1
     assert summary.mav.lost == len(drops.unmapped.mav) == 4 - summary.mav.dropped
@@ -85,14 +85,14 @@ def test_a_live_run_that_dropped_much_can_be_had_again(recording: Recording) -> 
 
 
 def assert_same(one: RunResult, two: RunResult) -> None:
-    """To the bit: the map, and every pose when it was first said."""
+    """The map and every live pose are equal to the bit."""
     clouds = [result.augmented.cloud_ground for result in (one, two)]
     assert len(clouds[0]) > 100
     assert clouds[0].points.tobytes() == clouds[1].points.tobytes()
     for robot in ("mav", "ground"):
-        said = [result.tracked[robot].front_end.live_poses() for result in (one, two)]
-        assert said[0]
-        for (one_ns, one_pose), (two_ns, two_pose) in zip(*said, strict=True):
+        live = [result.tracked[robot].front_end.live_poses() for result in (one, two)]
+        assert live[0]
+        for (one_ns, one_pose), (two_ns, two_pose) in zip(*live, strict=True):
             assert one_ns == two_ns
             assert one_pose.matrix().tobytes() == two_pose.matrix().tobytes()
 
@@ -112,16 +112,16 @@ class Running:
         )
         wait_until(lambda: len(self.robots()) == 2)
         self.children = self.robots()
-        # Both are playing once they hold the sockets that they send through.
+        # A robot plays once its process holds the socket that it sends through.
         wait_until(lambda: all(self.is_connected(child) for child in self.children.values()))
 
     def robots(self) -> dict[str, int]:
-        """The trackers' processes, by the socket files that they were handed."""
+        """The trackers' processes, spawned by the run."""
         pid = self.process.pid
         text = Path(f"/proc/{pid}/task/{pid}/children").read_text()
         named = {}
         for child in map(int, text.split()):
-            with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # gone meanwhile
+            with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # ended meanwhile
                 if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes():
                     named[f"{child}"] = child
         return named
@@ -134,8 +134,8 @@ class Running:
         return "anon_inode:[eventpoll]" in links
 
     def finish(self) -> tuple[int, str]:
-        _, said = self.process.communicate(timeout=PATIENCE_S * 3)
-        return self.process.returncode, said
+        _, errors = self.process.communicate(timeout=PATIENCE_S * 3)
+        return self.process.returncode, errors
 
 
 def wait_until(condition: Callable[[], bool]) -> None:
@@ -146,7 +146,7 @@ def wait_until(condition: Callable[[], bool]) -> None:
 
 
 def is_gone(pid: int) -> bool:
-    """Ended, and not only waiting to be buried by a parent that is no longer there."""
+    """Whether the process has ended, as a zombie or altogether."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
     except FileNotFoundError:
@@ -158,27 +158,27 @@ def test_an_interrupt_ends_all_processes_and_leaves_nothing(
 ) -> None:
     running = Running(recording, tmp_path / "out")
     running.process.send_signal(signal.SIGINT)
-    code, said = running.finish()
-    assert code == console.EXIT_INTERRUPTED, said
-    assert said.splitlines()[-1] == "airground: error: interrupted"
+    code, errors = running.finish()
+    assert code == console.EXIT_INTERRUPTED, errors
+    assert errors.splitlines()[-1] == "airground: error: interrupted"
     wait_until(lambda: all(is_gone(child) for child in running.children.values()))
     assert list(tmp_path.iterdir()) == []
 
 
-def test_nobody_outlives_a_run_that_is_killed(recording: Recording, tmp_path: Path) -> None:
+def test_no_process_outlives_a_run_that_is_killed(recording: Recording, tmp_path: Path) -> None:
     running = Running(recording, tmp_path / "out")
     running.process.kill()
     running.finish()
     wait_until(lambda: all(is_gone(child) for child in running.children.values()))
 
 
-def test_a_robot_that_dies_stops_nobody_and_is_reported(
+def test_a_robot_that_dies_is_reported_and_the_run_goes_on(
     recording: Recording, tmp_path: Path
 ) -> None:
     running = Running(recording, tmp_path / "out")
     os.kill(max(running.children.values()), signal.SIGKILL)  # started last: the MAV
-    code, said = running.finish()
-    assert code == console.EXIT_OK, said
+    code, errors = running.finish()
+    assert code == console.EXIT_OK, errors
     live = json.loads((tmp_path / "out" / "summary.json").read_text())["realtime"]
     assert (live["mav"]["survived"], live["ground"]["survived"]) == (0, 1)
     assert live["ground"]["posed_ms"]["n"] == 4

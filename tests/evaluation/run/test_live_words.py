@@ -1,4 +1,4 @@
-"""Words of `run --realtime` that make no sense get one line."""
+"""Invalid options of `run --realtime` give a one-line error."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from evaluation.setup import console
         (["--only", "mav", "--realtime"], "--only: without --realtime"),
     ],
 )
-def test_wrong_words_get_one_line(
+def test_invalid_options_give_a_one_line_error(
     words: list[str], named: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"

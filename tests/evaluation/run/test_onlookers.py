@@ -1,4 +1,4 @@
-"""Who watches a run sees every event with its frame, and its time counts for no stage."""
+"""An onlooker sees every event with its frame, and its time counts for no stage."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ FRAMES = [
 ]
 
 
-class Watching:
-    """Remembers all; each event takes it 100 s by the clock that stages are timed with."""
+class SlowOnlooker:
+    """Keeps all events; each takes 100 s by the clock that times the stages."""
 
     def __init__(self) -> None:
         self.seen: list[Seen] = []
@@ -56,7 +56,7 @@ class Watching:
 
 
 class Frames:
-    """Tracking that gives the frames above."""
+    """Tracking that yields the frames above."""
 
     def wait_until_ready(self) -> None:
         """Ready at once."""
@@ -76,8 +76,8 @@ def measured(*onlookers: Onlooker) -> RunRows:
     return rows
 
 
-def test_every_event_comes_with_the_frame_that_it_is_of() -> None:
-    watcher = Watching()
+def test_every_event_comes_with_its_frame() -> None:
+    watcher = SlowOnlooker()
     measured(watcher)
     kinds = [type(seen.event) for seen in watcher.seen]
     assert kinds == [Initializing, GroundTracked, GroundMapExtended, TrackingLost]
@@ -86,8 +86,8 @@ def test_every_event_comes_with_the_frame_that_it_is_of() -> None:
     assert all(seen.sighting is None for seen in watcher.seen)
 
 
-def test_watching_counts_for_no_stage(monkeypatch: pytest.MonkeyPatch) -> None:
-    watcher = Watching()
+def test_the_time_of_onlookers_counts_for_no_stage(monkeypatch: pytest.MonkeyPatch) -> None:
+    watcher = SlowOnlooker()
     monkeypatch.setattr("evaluation.run.onlooker.time.perf_counter", lambda: watcher.now_s)
     measure = measured(watcher)
     assert [row.value for row in measure.out.rows if row.stage == "timing"] == [0.0]

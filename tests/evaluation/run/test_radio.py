@@ -1,4 +1,4 @@
-"""What a limited radio link does to messages."""
+"""Arrival and loss of messages on a limited radio link."""
 
 from __future__ import annotations
 
@@ -33,21 +33,21 @@ def test_messages_queue_for_half_a_second_and_are_then_lost() -> None:
     assert max(waits) <= (500 + 66 + 1) * MS
 
 
-def test_losses_are_as_many_as_told_and_the_same_every_time() -> None:
+def test_the_share_of_losses_is_the_set_one_and_the_same_every_time() -> None:
     limits = RadioLimits(loss=0.2)
     arrivals = sent(limits, 2000, 100)
     assert np.mean([arrival is None for arrival in arrivals]) == pytest.approx(0.2, abs=0.03)
     assert arrivals == sent(limits, 2000, 100)
 
 
-def test_a_message_that_vanishes_has_used_the_link() -> None:
+def test_a_message_lost_at_random_occupies_the_link() -> None:
     radio = Radio(RadioLimits(mbit_s=8.0, loss=1.0), np.random.default_rng(0))
     assert radio.transmit(0, 10_000) is None
     assert radio.carried_bytes == 10_000
     assert radio._free_ns == 10 * MS
 
 
-def test_what_is_given_up_has_used_nothing() -> None:
+def test_a_message_that_waits_too_long_does_not_occupy_the_link() -> None:
     radio = Radio(RadioLimits(mbit_s=8.0), np.random.default_rng(0))
     assert radio.transmit(0, 600_000) == 600 * MS
     assert radio.transmit(MS, 600_000) is None

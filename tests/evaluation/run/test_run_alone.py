@@ -47,13 +47,13 @@ def test_a_tum_folder_is_tracked_and_measured(tum: Path, tmp_path: Path) -> None
     out = tmp_path / "out"
     words = ("run", tum, "--only", "ground", "--front-end", "opencv", "--out", out)
     assert airground(*words) == console.EXIT_OK
-    told = summary(out)
-    assert told["layout"] == "tum"
-    assert told["pose_frame"] == "camera"
-    assert told["tracked_fraction"] == 1.0
-    assert told["error"]["final"]["poses"] == FRAMES
-    assert told["error"]["final"]["ate_se3_rmse_m"] < 0.005
-    assert told["frame_ms"]["median"] > 0
+    made = summary(out)
+    assert made["layout"] == "tum"
+    assert made["pose_frame"] == "camera"
+    assert made["tracked_fraction"] == 1.0
+    assert made["error"]["final"]["poses"] == FRAMES
+    assert made["error"]["final"]["ate_se3_rmse_m"] < 0.005
+    assert made["frame_ms"]["median"] > 0
     for name in ("trajectory", "trajectory_live"):
         path = file_interface.read_tum_trajectory_file(str(out / f"{name}.tum"))
         stamps = [image.stamp_ns / 1e9 for image in ground_sequence(FRAMES).images]
@@ -61,15 +61,15 @@ def test_a_tum_folder_is_tracked_and_measured(tum: Path, tmp_path: Path) -> None
 
 
 def test_an_euroc_folder_is_tracked_and_measured(euroc: Path, tmp_path: Path) -> None:
-    """Poses of the camera go in; those of the body come out, as EuRoC states them."""
+    """The input has poses of the camera, the output those of the body, as EuRoC states them."""
     sequence = mav_sequence(FRAMES)
     write_tum(tmp_path / "poses.tum", sequence.T_world_camera)
     out = tmp_path / "out"
     words = ("run", euroc / "mav0", "--only", "mav", "--front-end", "file")
     assert airground(*words, "--trajectory", tmp_path / "poses.tum", "--out", out) == 0
-    told = summary(out)
-    assert told["pose_frame"] == "body"
-    assert told["error"]["live"]["ate_se3_rmse_m"] < 1e-6
+    made = summary(out)
+    assert made["pose_frame"] == "body"
+    assert made["error"]["live"]["ate_se3_rmse_m"] < 1e-6
     body = read_tum(out / "trajectory.tum")
     T_camera_body = sequence.calibration.T_imu_camera.inverse()
     for index in (0, FRAMES - 1):
@@ -99,7 +99,7 @@ BAD_WORDS = {
 
 
 @pytest.mark.parametrize("what", BAD_WORDS)
-def test_wrong_words_are_one_line_and_leave_nothing(
+def test_invalid_options_give_a_one_line_error_and_leave_nothing(
     tum: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], what: str
 ) -> None:
     words, message = BAD_WORDS[what]

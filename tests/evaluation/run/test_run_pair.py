@@ -1,4 +1,4 @@
-"""Data of one's own: what was exported comes back the same, and files replace stages."""
+"""Recordings of a user's own: exports are read back the same, and files replace stages."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from evaluation import cli
 from evaluation.datasets.formats import FORMATS, robots_for
 from evaluation.datasets.simulated import Simulated
 from evaluation.run.given_map import read_map
-from evaluation.run.pair import run_pair
+from evaluation.run.own_recordings import run_pair
 from evaluation.setup import console
 from evaluation.setup.setups import Given, Setup
 from sim.recording.recorder import record
@@ -59,7 +59,7 @@ def airground(*words: object) -> int:
 
 
 def exported(path: Path, out: Path) -> Pair:
-    """A recording handed out and taken in again."""
+    """A recording exported and read back."""
     simulated = Simulated.open(path)
     for name in ("euroc", "tum"):
         (out / name).mkdir()
@@ -80,8 +80,8 @@ def content(message: Any) -> list[np.ndarray]:
     raise TypeError(type(message))
 
 
-def test_an_export_comes_back_message_by_message(small: Path, tmp_path: Path) -> None:
-    """To the last bit, so that whatever reads the messages gives the same result."""
+def test_an_export_is_read_back_message_by_message(small: Path, tmp_path: Path) -> None:
+    """Messages are equal to the bit, and so is every result from them."""
     recording, pair = Recording.open(small), exported(small, tmp_path)
     ours, back = list(recording.messages()), list(pair.messages())
     assert len(ours) == len(back) == 2 * 3 * 21
@@ -92,15 +92,15 @@ def test_an_export_comes_back_message_by_message(small: Path, tmp_path: Path) ->
             np.testing.assert_array_equal(a, b)
 
 
-def test_an_exports_calibration_comes_back(small: Path, tmp_path: Path) -> None:
+def test_the_calibration_of_an_export_is_read_back(small: Path, tmp_path: Path) -> None:
     recording, pair = Recording.open(small), exported(small, tmp_path)
     for robot in Source:
-        told, back = recording.of(robot).calibration, pair.of(robot).calibration
-        assert told.camera == back.camera
-        assert told.imu == back.imu
-        np.testing.assert_array_equal(told.T_imu_camera.matrix(), back.T_imu_camera.matrix())
-        # Plain folders do not say where the body is; up in it comes from the accelerometer.
-        up = told.T_body_imu.rotation.T[:, 2] @ back.T_body_imu.rotation.T[:, 2]
+        ours, back = recording.of(robot).calibration, pair.of(robot).calibration
+        assert ours.camera == back.camera
+        assert ours.imu == back.imu
+        np.testing.assert_array_equal(ours.T_imu_camera.matrix(), back.T_imu_camera.matrix())
+        # Plain folders lack the pose of the body; its up direction comes from the accelerometer.
+        up = ours.T_body_imu.rotation.T[:, 2] @ back.T_body_imu.rotation.T[:, 2]
         assert np.rad2deg(np.arccos(min(up, 1.0))) < 15  # the MAV leans into its flight
 
 
@@ -108,21 +108,21 @@ def test_both_plain_folders_run(tum: Path, euroc: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     words = ("run", "--mav", euroc, "--ground", tum, "--heading", "search", "--out", out)
     assert airground(*words) == console.EXIT_OK
-    told = json.loads((out / "summary.json").read_text())
-    assert told["schema"] == "airground-pair"
-    assert told["replaced"] == ""
+    made = json.loads((out / "summary.json").read_text())
+    assert made["schema"] == "airground-pair"
+    assert made["replaced"] == ""
     for robot, layout in (("mav", "euroc"), ("ground", "tum")):
-        assert told["robots"][robot]["images"] == FRAMES
-        assert told["robots"][robot]["layout"] == layout
-    assert told["robots"]["ground"]["tracked_fraction"] == 1.0
-    assert told["robots"]["ground"]["error"]["final"]["ate_se3_rmse_m"] < 0.02
+        assert made["robots"][robot]["images"] == FRAMES
+        assert made["robots"][robot]["layout"] == layout
+    assert made["robots"]["ground"]["tracked_fraction"] == 1.0
+    assert made["robots"]["ground"]["error"]["final"]["ate_se3_rmse_m"] < 0.02
     assert len(read_tum(out / "ground.tum")) == FRAMES
     cloud, _ = read_ply(out / "augmented_map.ply")
-    assert sum(told["map_points"].values()) == len(cloud)
+    assert sum(made["map_points"].values()) == len(cloud)
     assert (out / "config.toml").exists()
 
 
-def test_without_truth_all_else_is_drawn_and_nothing_changes(
+def test_rerun_without_truth_shows_the_rest_and_changes_no_result(
     tum: Path, euroc: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ("run", "--mav", euroc, "--ground", tum, "--heading", "search")
@@ -147,10 +147,10 @@ def test_without_truth_all_else_is_drawn_and_nothing_changes(
     assert tracked == ["ground robot: tracked"]
 
 
-def test_files_replace_the_stages_and_the_summary_says_so(
+def test_files_replace_stages_and_the_summary_names_them(
     tum: Path, euroc: Path, tmp_path: Path
 ) -> None:
-    """Poses are passed on as they are, and the map is the one that was given."""
+    """Poses and map are those of the files, unchanged."""
     write_tum(tmp_path / "mav.tum", mav_sequence(FRAMES).T_world_camera)
     write_tum(tmp_path / "ground.tum", ground_sequence(FRAMES).T_world_camera)
     points = np.random.default_rng(0).uniform(0, 2, (500, 3)).astype(np.float32)
@@ -160,9 +160,9 @@ def test_files_replace_the_stages_and_the_summary_says_so(
     words += ["--ground-trajectory", tmp_path / "ground.tum"]
     words += ["--ground-map", tmp_path / "map.ply", "--out", tmp_path / "out"]
     assert airground(*words) == console.EXIT_OK
-    told = json.loads((tmp_path / "out" / "summary.json").read_text())
-    assert told["replaced"] == "MAV poses, ground poses, ground map from a file"
-    assert told["robots"]["mav"]["tracked_fraction"] == 1.0
+    made = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert made["replaced"] == "MAV poses, ground poses, ground map from a file"
+    assert made["robots"]["mav"]["tracked_fraction"] == 1.0
     given, left = (read_tum(tmp_path / name) for name in ("ground.tum", "out/ground.tum"))
     np.testing.assert_allclose(left.translations, given.translations, atol=1e-8)
     cloud, sources = read_ply(tmp_path / "out" / "augmented_map.ply")
@@ -188,7 +188,7 @@ REFUSED: dict[str, tuple[list[str], str]] = {
 
 
 @pytest.mark.parametrize("what", REFUSED)
-def test_words_without_a_meaning_are_refused(
+def test_invalid_options_are_refused(
     what: str, tum: Path, euroc: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words, pattern = REFUSED[what]
@@ -201,7 +201,7 @@ def test_words_without_a_meaning_are_refused(
     assert not list(tmp_path.iterdir())
 
 
-def test_a_ground_robot_that_comes_too_late_is_refused(tum: Path, euroc: Path) -> None:
+def test_a_ground_recording_that_starts_too_late_is_refused(tum: Path, euroc: Path) -> None:
     mav, ground = open_robot(euroc, Source.MAV), open_robot(tum, Source.GROUND)
     late = replace(ground, camera_stamps=ground.camera_stamps + 10**15)
     with pytest.raises(RecordingError, match="same clock"):
@@ -222,7 +222,7 @@ def test_maps_of_any_kind_are_read(tmp_path: Path, ascii_: bool) -> None:
     assert (cloud.colours == 128).all()
 
 
-def test_maps_that_cannot_be_one_are_refused(tmp_path: Path) -> None:
+def test_invalid_maps_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "map.ply"
     header = "ply\nformat ascii 1.0\nelement vertex {}\n" + "".join(
         f"property float {axis}\n" for axis in "xyz"
@@ -245,7 +245,7 @@ def test_maps_that_cannot_be_one_are_refused(tmp_path: Path) -> None:
         read_map(tmp_path / "none.ply")
 
 
-def test_given_poses_are_no_slam() -> None:
+def test_poses_from_a_file_do_not_count_as_slam() -> None:
     path = Trajectory.from_poses([0], [SE3.identity()])
     setup = Setup(Config(), given=Given(mav=path))
     assert setup.slam_robots() == {"ground"}
@@ -258,7 +258,7 @@ def test_a_round_trip_gives_the_same_result(tmp_path: Path) -> None:
     path = record(load_scene("tiny"), 0, NOMINAL, tmp_path / "tiny", 22.0)
     assert airground("run", path, "--out", tmp_path / "native") == console.EXIT_OK
     result = run_pair(exported(path, tmp_path), Setup(Config()), 0)
-    assert result.alignments
+    assert result.events.alignments
     native, _ = read_ply(tmp_path / "native" / "augmented_map.ply")
     np.testing.assert_array_equal(result.augmented.cloud_ground.points, native.points)
     write_ply(tmp_path / "back.ply", result.augmented.cloud_ground, result.augmented.sources)

@@ -1,4 +1,4 @@
-"""Tracking in other processes gives what tracking here gives, and their end is noticed."""
+"""Tracking in other processes equals tracking here, and the death of a process is an error."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def task(path: Path, dropped: tuple[int, ...] = ()) -> TrackingTask:
 
 
 def content(frame: TrackedFrame) -> list[object]:
-    """All that a frame holds, as bytes where it is more than a number."""
+    """Contents of a frame, arrays as bytes."""
     image, pose = frame.image, frame.pose
     arrays = [image.image] if isinstance(image, MavImage) else [image.colour, image.depth]
     if pose.T_map_camera is not None:
@@ -47,7 +47,7 @@ def content(frame: TrackedFrame) -> list[object]:
     return [*rest, *((array.shape, array.dtype, array.tobytes()) for array in arrays)]
 
 
-def test_frames_and_report_are_those_of_tracking_here(
+def test_frames_and_report_equal_those_of_tracking_here(
     small: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(tracking_apart, "FRAMES_AHEAD", 5)  # slots are used again
@@ -58,23 +58,23 @@ def test_frames_and_report_are_those_of_tracking_here(
     with TrackingApart(task(small, dropped)) as apart:
         apart.wait_until_ready()
         found = [content(frame) for frame in apart.frames()]
-        told = apart.report()
+        other_report = apart.report()
     assert len(wanted) == 2 * 21 - 1
     assert found == wanted
-    assert told.ground is not None
+    assert other_report.ground is not None
     assert report.ground is not None
-    assert told.ground.translations.tobytes() == report.ground.translations.tobytes()
+    assert other_report.ground.translations.tobytes() == report.ground.translations.tobytes()
     for robot, one in report.tracked.items():
-        other = told.tracked[robot]
+        other = other_report.tracked[robot]
         assert other.slam == one.slam == (robot == "ground")
         assert len(other.front_end.durations_ms) == len(one.front_end.durations_ms)
         assert [stamp for stamp, _ in other.final_poses()] == [s for s, _ in one.final_poses()]
-    assert told.peak_memory_mib > 50
-    assert told.processor_s > 0
+    assert other_report.peak_memory_mib > 50
+    assert other_report.processor_s > 0
 
 
-def test_a_process_that_tracks_does_without_what_others_need() -> None:
-    """Of each there would be two more: some 100 MiB a process."""
+def test_tracking_processes_do_not_import_large_libraries() -> None:
+    """Each import would cost some 100 MiB in each of two processes."""
     script = (
         "import sys; import evaluation.run.tracking_apart\n"
         "print(sorted({'open3d', 'mujoco', 'pandas', 'evo', 'matplotlib'} & set(sys.modules)))"
@@ -86,7 +86,7 @@ def test_a_process_that_tracks_does_without_what_others_need() -> None:
 
 
 def test_frames_can_be_kept(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nobody writes into an image that was handed over, though its slot is used again."""
+    """An image that was handed over keeps its pixels when its slot is used again."""
     monkeypatch.setattr(tracking_apart, "FRAMES_AHEAD", 2)
     with TrackingApart(task(small)) as apart:
         apart.wait_until_ready()
@@ -107,7 +107,7 @@ def test_frames_can_be_kept(small: Path, monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 @pytest.mark.slow
-def test_what_cannot_be_read_is_told_as_here(small: Path, tmp_path: Path) -> None:
+def test_an_unreadable_image_raises_the_same_error(small: Path, tmp_path: Path) -> None:
     broken = tmp_path / "broken"
     shutil.copytree(small, broken)
     sorted((broken / "mav0" / "cam0" / "data").iterdir())[9].write_bytes(b"no picture")
@@ -123,10 +123,10 @@ def test_what_cannot_be_read_is_told_as_here(small: Path, tmp_path: Path) -> Non
 
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", [0, 1])
-def test_a_death_is_told_and_all_end_with_the_block(
+def test_a_death_raises_an_error_and_all_processes_end_with_the_block(
     small: Path, robot: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # Neither can be through with its 21 images before it dies: it waits for a free slot.
+    # No process finishes its 21 images before it is killed: each waits for a free slot.
     monkeypatch.setattr(tracking_apart, "FRAMES_AHEAD", 2)
     with TrackingApart(task(small)) as apart:
         apart.wait_until_ready()

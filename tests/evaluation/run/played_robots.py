@@ -1,4 +1,4 @@
-"""Robots that live through a recording made by hand, without a second passing."""
+"""Robots that play a recording made by hand, on a clock that the test sets."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from airground.slam.front_end import TrackedPose, Tracking
 from airground.tracking import FrontEnds, RobotTracker, TrackedFrame, Trackers
 from evaluation.run.drops import DropList, Stamps, fingerprint
 from evaluation.run.live.arrivals import Stream, in_order
-from evaluation.run.live.player import Played, play
+from evaluation.run.live.playback import Played, play
 from evaluation.run.live.radio_link import Radio, RadioLimits, Uplink
 
 
 class SteppedClock:
-    """Time passes only where somebody says so."""
+    """A clock that moves only when it is set."""
 
     def __init__(self) -> None:
         self.time_ns = 0
@@ -34,11 +34,11 @@ class SteppedClock:
         self.time_ns = max(self.time_ns, stamp_ns)
 
 
-class Remembering:
-    """A front end whose poses show all that it was ever fed; it may take its time.
+class DigestFrontEnd:
+    """A front end whose poses depend on all its inputs; each image may take a set time.
 
     Each pose depends on every sample and image before it, as in real tracking, so that
-    two runs agree to the bit only if they were fed the same bundles.
+    two runs agree to the bit only if they had the same bundles.
     """
 
     def __init__(self, clock: SteppedClock | None = None, work_ns: int = 0) -> None:
@@ -61,7 +61,7 @@ class Remembering:
         return TrackedPose(image.stamp_ns, Tracking.TRACKED, pose, corrected=self._digest < 2.0)
 
     def finish(self) -> None:
-        """Nothing was put off."""
+        """Nothing to do."""
 
     def trajectory(self) -> Trajectory | None:
         if not self._poses:
@@ -71,7 +71,7 @@ class Remembering:
 
 @dataclass
 class Robots:
-    """Both robots with their own trackers, uplinks and clocks, and what became of them."""
+    """Both robots with their own trackers, uplinks and clocks, and the outcome of each."""
 
     recording: Recording
     work_ns: dict[Source, int] = field(default_factory=dict)
@@ -80,20 +80,20 @@ class Robots:
     radio: RadioLimits | None = None
     uplinks: dict[Source, Uplink] = field(default_factory=dict)
     played: dict[Source, Played] = field(default_factory=dict)
-    front_ends: dict[Source, Remembering] = field(default_factory=dict)
+    front_ends: dict[Source, DigestFrontEnd] = field(default_factory=dict)
     streams: dict[Source, Stream] = field(default_factory=dict)
 
-    def live(self) -> None:
+    def play(self) -> None:
         for robot in Source:
             clock = SteppedClock()
-            front_end = Remembering(clock, self.work_ns.get(robot, 0))
+            front_end = DigestFrontEnd(clock, self.work_ns.get(robot, 0))
             self.front_ends[robot] = front_end
             receiver = Receiver()
             self.streams[robot] = Stream(receiver, lambda: True)
             radio = self.radio if robot == Source.MAV else None
             uplink = Uplink(
                 Sender(receiver.address, self.frames_under_way),
-                None if radio is None else Radio(radio, np.random.default_rng(0)),
+                Radio(radio or RadioLimits(), np.random.default_rng(0)),
                 None if radio is None else radio.jpeg_quality,
             )
             tracker = RobotTracker(robot, self.recording.of(robot).calibration, front_end)
@@ -103,7 +103,7 @@ class Robots:
             self.uplinks[robot] = uplink
 
     def received(self) -> list[TrackedFrame]:
-        """What the mapper gets, long after."""
+        """Frames that reach the mapper, all messages having arrived."""
         clock = SteppedClock()
         clock.wait_until(10**12)
         return list(in_order(self.streams, clock, patience_s=10.0))
@@ -124,13 +124,13 @@ class Robots:
 
 
 def offline(recording: Recording, drops: DropList) -> list[TrackedFrame]:
-    """What the mapper gets in a run that takes its time and does without the same frames."""
-    front_ends = FrontEnds(Remembering(), Remembering())
+    """Frames that reach the mapper in a run offline with the same drop list."""
+    front_ends = FrontEnds(DigestFrontEnd(), DigestFrontEnd())
     trackers = Trackers(recording.mav.calibration, recording.ground.calibration, front_ends)
     messages = recording.messages(drops.dropped.by_robot())
     return list(drops.received(trackers.frames(messages)))
 
 
 def packed(frames: list[TrackedFrame]) -> list[list[bytes]]:
-    """All that the mapper is told, to the bit."""
+    """The frames as bytes."""
     return [pack(frame) for frame in frames]

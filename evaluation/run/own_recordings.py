@@ -1,0 +1,304 @@
+"""Recordings of a user's own, of any known layout: one robot alone, or both robots.
+
+The truth is optional: errors are stated for the images whose true pose is known.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airground.augmentation import AugmentedMap
+from airground.core.belief import Alignment
+from airground.core.cloud import Source
+from airground.core.events import Aligned, BeliefUpdated, SurfaceCast
+from airground.core.messages import GroundImage, ImuSamples, MavImage
+from airground.core.trajectory import Trajectory
+from airground.errors import InputError
+from airground.io.ply import write_ply
+from airground.io.robot_recording import Pair, RobotRecording
+from airground.io.tum import write_tum
+from airground.slam.front_end import FrontEnd
+from evaluation.run.driver import drive, pipeline_for
+from evaluation.run.onlooker import Onlooker, Seen
+from evaluation.run.tracking import (
+    TrackingHere,
+    TrackingTask,
+    live_path,
+    localizer_rng,
+    write_paths,
+)
+from evaluation.setup.checked_json import number
+from evaluation.setup.progress import step
+from evaluation.setup.setups import Setup
+from evaluation.setup.text import TextTable, metres, percent, print_table, seconds
+from evaluation.table.tracked_share import TruePose, tracked_share_of
+from evaluation.table.tracking_log import FrontEndLog, Tracked, WatchedFrontEnd
+from evaluation.table.trajectory_error import trajectory_error
+from evaluation.table.true_camera import true_camera
+
+
+@dataclass(frozen=True, eq=False)
+class AloneResult:
+    """Outcome of one front end over one robot's recording.
+
+    Attributes:
+        log: Answers to all images, in order of time.
+        final: Final trajectory, camera in map; None without poses.
+        finish_ms: Time taken after the last image [ms].
+    """
+
+    log: FrontEndLog
+    final: Trajectory | None
+    finish_ms: float
+
+
+def run_alone(recording: RobotRecording, front_end: FrontEnd[Any]) -> AloneResult:
+    """Feed a whole recording to a front end."""
+    watched = WatchedFrontEnd(front_end)
+    with step("tracking", len(recording.camera_stamps), "images") as running:
+        for stamped in recording.messages():
+            match stamped.message:
+                case ImuSamples() as samples:
+                    watched.add_imu(samples)
+                case MavImage() | GroundImage() as image:
+                    watched.track(image)
+                    running.advance()
+    started_s = time.perf_counter()
+    watched.finish()
+    finish_ms = 1e3 * (time.perf_counter() - started_s)
+    return AloneResult(watched.log(), watched.trajectory(), finish_ms)
+
+
+def write_alone(
+    folder: Path,
+    recording: RobotRecording,
+    front_end: str,
+    result: AloneResult,
+    true_pose: TruePose | None,
+) -> dict[str, Any]:
+    """Write `trajectory.tum`, `trajectory_live.tum` and `summary.json`; returns the summary."""
+    durations_ms = np.array(result.log.durations_ms)
+    summary = {
+        "schema": "airground-alone",
+        "version": 1,
+        "robot": recording.robot.name.lower(),
+        "front_end": front_end,
+        **_robot(folder, "trajectory", recording, result.log, result.final, true_pose),
+        "frame_ms": {
+            "mean": float(durations_ms.mean()),
+            "median": float(np.median(durations_ms)),
+            "p95": float(np.percentile(durations_ms, 95)),
+        },
+        "finish_ms": result.finish_ms,
+    }
+    _write_summary(folder, summary)
+    return summary
+
+
+def print_alone(summary: dict[str, Any]) -> None:
+    """Print the summary of one robot as a short table."""
+    times = summary["frame_ms"]
+    rows = [
+        ("images", str(summary["images"])),
+        ("tracked, from the first motion on", percent(summary["tracked_fraction"])),
+        ("first pose after", seconds(summary["first_pose_s"])),
+        ("lost after the first pose", str(summary["lost_images"])),
+        ("time a frame: mean, 95th percentile", f"{times['mean']:.1f}, {times['p95']:.1f} ms"),
+    ]
+    for name, error in summary["error"].items():
+        if error is None:
+            unknown = "truth unknown" if summary["tracked_fraction"] else "-"
+            rows.append((f"{name} poses, error", unknown))
+            continue
+        rows += [
+            (f"{name} poses, RMS after SE3", metres(error["ate_se3_rmse_m"])),
+            (f"{name} poses, RMS after Sim3", metres(error["ate_sim3_rmse_m"])),
+            (f"{name} poses, RMS over 1 m of path", metres(error["rpe_1m_rmse_m"])),
+            (f"{name} poses, scale error", f"{100 * error['scale_error']:+.2f} %"),
+        ]
+    title = f"{summary['robot']} alone, front end {summary['front_end']}"
+    caption = "errors by evo, of the camera's position, after the alignment named"
+    print_table(TextTable(("", "here"), tuple(rows)), title, caption, bold=(1,))
+
+
+@dataclass(eq=False)
+class PairEvents:
+    """An onlooker that keeps what a run without truth reports.
+
+    Attributes:
+        surfaces: Number of aerial surfaces.
+        located: Number of aerial surfaces after which a position was claimed.
+        alignments: Every refinement, in order of time.
+    """
+
+    surfaces: int = 0
+    located: int = 0
+    alignments: list[Alignment] = field(default_factory=list)
+
+    def see(self, seen: Seen) -> None:
+        """Count one event."""
+        match seen.event:
+            case SurfaceCast():
+                self.surfaces += 1
+            case BeliefUpdated(belief=belief):
+                self.located += belief.converged
+            case Aligned(alignment=alignment):
+                self.alignments.append(alignment)
+
+
+@dataclass(frozen=True, eq=False)
+class PairResult:
+    """What a run over two recordings leaves.
+
+    Attributes:
+        tracked: Answers of the front ends, by robot ("mav", "ground").
+        augmented: The augmented map.
+        events: Surfaces, claims and alignments.
+    """
+
+    tracked: dict[str, Tracked]
+    augmented: AugmentedMap
+    events: PairEvents
+
+
+def run_pair(pair: Pair, setup: Setup, seed: int, onlookers: Sequence[Onlooker] = ()) -> PairResult:
+    """Run the pipeline of Figure 4 from the first message to the last.
+
+    A recording of ours that was exported and is read as a pair gives the same result as itself.
+
+    Args:
+        pair: Measurements of both robots.
+        setup: Settings of the pipeline.
+        seed: Seed of all random numbers.
+        onlookers: Consumers of every event.
+
+    Raises:
+        InputError: The setup takes the heading from magnetometers, and a robot has none.
+    """
+    if setup.config.localization.heading != "search":
+        for recording in (pair.mav, pair.ground):
+            if recording.magnetic is None:
+                raise InputError(
+                    f"{recording.path}: has no magnetometer (mag0), so that the heading is "
+                    "unknown; give --heading search"
+                )
+    tracking = TrackingHere(TrackingTask(pair, None, setup, seed))
+    pipeline = pipeline_for(pair, setup, localizer_rng(seed, flight=0))
+    events = PairEvents()
+    driven = drive(pair, tracking, pipeline, setup, [events, *onlookers])
+    return PairResult(driven.tracked, pipeline.augmented_map(), events)
+
+
+def write_pair(folder: Path, pair: Pair, setup: Setup, result: PairResult) -> dict[str, Any]:
+    """Write the map, the trajectories and `summary.json`; returns the summary.
+
+    Each robot leaves `ROBOT.tum` and `ROBOT_live.tum`; `T_ground_mav.tum` has the accepted
+    alignments by the stamps of their surfaces.
+    """
+    augmented, events = result.augmented, result.events
+    write_ply(folder / "augmented_map.ply", augmented.cloud_ground, augmented.sources)
+    accepted = [alignment for alignment in events.alignments if alignment.accepted]
+    if accepted:
+        stamps_ns = [alignment.stamp_ns for alignment in accepted]
+        poses = [alignment.T_ground_mav for alignment in accepted]
+        write_tum(folder / "T_ground_mav.tum", Trajectory.from_poses(stamps_ns, poses))
+    robots = {}
+    for name, tracked in result.tracked.items():
+        recording, log = pair.of(Source[name.upper()]), tracked.front_end
+        robots[name] = _robot(folder, name, recording, log, tracked.final, true_camera(recording))
+        robots[name]["frame_ms_median"] = float(np.median(log.durations_ms))
+    summary = {
+        "schema": "airground-pair",
+        "version": 1,
+        "preset": setup.config.preset,
+        "replaced": setup.given.describe(),
+        "aerial_surfaces": events.surfaces,
+        "located": events.located,
+        "alignments": len(events.alignments),
+        "accepted": len(accepted),
+        "map_points": {
+            robot.name.lower(): int((augmented.sources == robot).sum()) for robot in Source
+        },
+        "robots": robots,
+    }
+    _write_summary(folder, summary)
+    return summary
+
+
+def print_pair(summary: dict[str, Any]) -> None:
+    """Print the summary of both robots as a short table."""
+    rows = [
+        ("aerial surfaces", str(summary["aerial_surfaces"])),
+        ("located after", str(summary["located"])),
+        ("alignments accepted", f"{summary['accepted']} of {summary['alignments']}"),
+    ]
+    for name, robot in summary["robots"].items():
+        error = robot["error"]["final"]
+        rows += [
+            (f"{name}: tracked", percent(robot["tracked_fraction"])),
+            (f"{name}: first pose after", seconds(robot["first_pose_s"])),
+        ]
+        for label, key in (("RMS after SE3", "ate_se3_rmse_m"), ("over 1 m", "rpe_1m_rmse_m")):
+            rms = "truth unknown" if error is None else metres(error[key])
+            rows.append((f"{name}: {label}", rms))
+    title = f"both robots, preset {summary['preset']}"
+    print_table(TextTable(("", "here"), tuple(rows)), title, summary["replaced"], bold=(1,))
+
+
+def _robot(
+    folder: Path,
+    name: str,
+    recording: RobotRecording,
+    log: FrontEndLog,
+    final: Trajectory | None,
+    true_pose: TruePose | None,
+) -> dict[str, Any]:
+    """Write one robot's trajectories; returns its part of the summary."""
+    write_paths(folder, name, recording, log, final)
+    share = tracked_share_of(recording, log.answers, true_pose)
+    return {
+        "layout": recording.layout,
+        "pose_frame": recording.pose_frame,
+        "recorded_s": recording.duration_s,
+        "images": len(log.answers),
+        "tracked_fraction": share.fraction,
+        "first_pose_s": number(share.first_pose_s),
+        "lost_images": share.lost_images,
+        "error": {"final": _error(true_pose, final), "live": _error(true_pose, live_path(log))},
+    }
+
+
+def _error(
+    true_pose: TruePose | None, cameras: Trajectory | None
+) -> dict[str, float | None] | None:
+    """Trajectory errors over the images whose true pose is known; None without any."""
+    if cameras is None or true_pose is None:
+        return None
+    true, poses = {}, []
+    for index, stamp_ns in enumerate(cameras.stamps_ns.tolist()):
+        if (pose := true_pose(stamp_ns)) is not None:
+            true[stamp_ns] = pose
+            poses.append((stamp_ns, cameras[index]))
+    error = trajectory_error(poses, true.__getitem__)
+    if not np.isfinite(error.se3_rmse_m):
+        return None  # too few poses, or all in one place
+    return {
+        "poses": len(poses),
+        "path_m": error.path_m,
+        "ate_se3_rmse_m": error.se3_rmse_m,
+        "ate_sim3_rmse_m": error.sim3_rmse_m,
+        "scale_error": error.scale_error,
+        "rpe_1m_rmse_m": number(error.rpe_1m_rmse_m),
+    }
+
+
+def _write_summary(folder: Path, summary: dict[str, Any]) -> None:
+    text = json.dumps(summary, indent=2) + "\n"
+    (folder / "summary.json").write_text(text, encoding="utf-8")
