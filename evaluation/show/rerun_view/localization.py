@@ -10,29 +10,35 @@ from airground.core.belief import Belief, CostMap, HeightMap
 from airground.core.events import BeliefUpdated, CostMapComputed, HeightMapsMade
 from evaluation.run.onlooker import Seen
 from evaluation.show.figures.fig08_particles import PARTICLES
-from evaluation.show.figures.style import COST_COLOURS, HEIGHT_COLOURS
-from evaluation.show.rerun_view.depth_maps import cell_pixels, coloured, rgb, upright
-from evaluation.show.rerun_view.sensor_stream import COSTS, TRUTH, SensorStream
+from evaluation.show.figures.style import COST_COLOURS, HEIGHT_COLOURS, value_range
+from evaluation.show.rerun_view.images import coloured
+from evaluation.show.rerun_view.sensor_stream import (
+    COSTS,
+    TRUTH,
+    TRUTH_COLOUR,
+    SensorStream,
+    rgb,
+)
 from evaluation.table.truth_errors import true_T_ground_mav
 from sim.recording.truth import Truth
 
 ROOM = "localization"
 TRUE_POSITION = f"{TRUTH}/position"
 SIGMAS = 2.0
-"""The ellipse's half axes, in standard deviations."""
+"""Half axes of the ellipse, in standard deviations."""
 ELLIPSE_STEPS = 48
-WHITE, TRUTH_COLOUR = (255, 255, 255), (255, 60, 200)
+WHITE = (255, 255, 255)
 CROSS_PX = 7.0
 ROOM_TO_GROW = 1.3
 """Side of all pictures of aerial height maps, in sides of the first map."""
 
 
 class Localization:
-    """What the particle filter works on and believes.
+    """Input and belief of the particle filter.
 
     Args:
-        stream: To draw on.
-        truth: Where given, the true position is drawn too.
+        stream: Output.
+        truth: Source of the true position; None leaves it out.
     """
 
     def __init__(self, stream: SensorStream, truth: Truth | None) -> None:
@@ -47,14 +53,17 @@ class Localization:
             stream.put_in_frame(COSTS, TRUE_POSITION)
 
     def see(self, seen: Seen) -> None:
-        """Draw what localization was given, and what it concluded."""
+        """Draw the input of localization, and its result."""
         stamp_ns = seen.event.stamp_ns
         match seen.event:
             case HeightMapsMade():
                 self._heights = seen.event
             case CostMapComputed(cost_map=cost_map):
                 self._cost_map = cost_map
-                self._stream.log(stamp_ns, f"{ROOM}/costs", cost_picture(cost_map))
+                # Low is dark, as in the paper; the highest tenth is clipped.
+                limits = value_range(cost_map.costs, 0, 90)
+                picture = coloured(upright(cost_map.costs), COST_COLOURS, *limits)
+                self._stream.log(stamp_ns, f"{ROOM}/costs", picture)
             case BeliefUpdated(belief=belief) if self._cost_map is not None:
                 self._draw_heights(stamp_ns, self._cost_map)
                 self._draw_belief(stamp_ns, belief, self._cost_map)
@@ -63,7 +72,7 @@ class Localization:
     def _draw_heights(self, stamp_ns: int, cost_map: CostMap) -> None:
         """The aerial map around its camera, the ground map where there are costs.
 
-        The viewer takes pictures that come under one name for a video: all have one size.
+        The viewer treats the pictures of an entity as a video: all have one size.
         """
         assert self._heights is not None
         aerial, ground = self._heights.aerial, self._heights.ground
@@ -71,38 +80,43 @@ class Localization:
             self._aerial_cells = round(ROOM_TO_GROW * max(aerial.heights.shape))
         side = self._aerial_cells
         corner = np.full(2, -(side // 2) / aerial.cells_per_m)
-        picture = height_picture(cut_out(aerial, corner, (side, side)))
-        self._stream.log(stamp_ns, f"{ROOM}/aerial_heights", picture)
-        picture = height_picture(cut_out(ground, cost_map.origin, cost_map.costs.shape))
-        self._stream.log(stamp_ns, f"{ROOM}/ground_heights", picture)
+        for name, made in (
+            ("aerial", cut_out(aerial, corner, (side, side))),
+            ("ground", cut_out(ground, cost_map.origin, cost_map.costs.shape)),
+        ):
+            low, high = value_range(made.heights, 1, 97)  # walls are clipped
+            limits = low, max(high, low + 0.05)
+            picture = coloured(upright(made.heights), HEIGHT_COLOURS, *limits)
+            self._stream.log(stamp_ns, f"{ROOM}/{name}_heights", picture)
 
     def _draw_belief(self, stamp_ns: int, belief: Belief, cost_map: CostMap) -> None:
-        particles = on_costs(belief.particles[:, :2], cost_map)
-        ellipse = on_costs(ellipse_points(belief.estimate[:2], belief.covariance), cost_map)
-        radius = rr.Radius.ui_points(2.0)
-        green = rr.Points2D(particles, colors=[rgb(PARTICLES)], radii=radius, draw_order=20)
-        outline = rr.LineStrips2D(
-            [ellipse], colors=[WHITE], radii=rr.Radius.ui_points(1.5), draw_order=30
-        )
-        said = f"spread {belief.spread_m:.2f} m" if belief.converged else "position refused"
-        estimate = rr.Points2D(
-            on_costs(belief.estimate[None, :2], cost_map),
-            colors=[WHITE],
-            radii=rr.Radius.ui_points(1.0),
-            draw_order=31,
-        )
+        ellipse = ellipse_points(belief.estimate[:2], belief.covariance)
         columns, rows = cost_map.costs.shape
-        verdict = rr.Points2D(
-            [[columns / 2, 0.88 * rows]],
-            colors=[WHITE],
-            radii=rr.Radius.ui_points(0.5),
-            labels=[said],
-            show_labels=True,
-        )
-        self._stream.log(stamp_ns, f"{ROOM}/costs/particles", green)
-        self._stream.log(stamp_ns, f"{ROOM}/costs/covariance", outline)
-        self._stream.log(stamp_ns, f"{ROOM}/costs/estimate", estimate)
-        self._stream.log(stamp_ns, f"{ROOM}/costs/verdict", verdict)
+        verdict = f"spread {belief.spread_m:.2f} m" if belief.converged else "position refused"
+        parts = {
+            "particles": rr.Points2D(
+                on_costs(belief.particles[:, :2], cost_map),
+                colors=[rgb(PARTICLES)],
+                radii=rr.Radius.ui_points(2.0),
+                draw_order=20,
+            ),
+            "covariance": _lines([on_costs(ellipse, cost_map)], WHITE, draw_order=30),
+            "estimate": rr.Points2D(
+                on_costs(belief.estimate[None, :2], cost_map),
+                colors=[WHITE],
+                radii=rr.Radius.ui_points(1.0),
+                draw_order=31,
+            ),
+            "verdict": rr.Points2D(
+                [[columns / 2, 0.88 * rows]],
+                colors=[WHITE],
+                radii=rr.Radius.ui_points(0.5),
+                labels=[verdict],
+                show_labels=True,
+            ),
+        }
+        for name, drawn in parts.items():
+            self._stream.log(stamp_ns, f"{ROOM}/costs/{name}", drawn)
 
     def _draw_truth(self, stamp_ns: int, seen: Seen, cost_map: CostMap) -> None:
         if self._truth is None or seen.sighting is None:
@@ -111,19 +125,15 @@ class Localization:
         true_u = (true @ seen.sighting.surface.T_mav_camera.translation)[:2]
         middle = on_costs(true_u[None], cost_map)[0]
         arms = CROSS_PX * np.array([[[-1, 0], [1, 0]], [[0, -1], [0, 1]]], np.float32)
-        cross = rr.LineStrips2D(
-            list(middle + arms),
-            colors=[TRUTH_COLOUR],
-            radii=rr.Radius.ui_points(1.5),
-            draw_order=40,
-        )
+        cross = _lines(list(middle + arms), TRUTH_COLOUR, draw_order=40)
         self._stream.log(stamp_ns, TRUE_POSITION, cross)
 
 
-def height_picture(made: HeightMap) -> rr.EncodedImage:
-    """Heights, walls and other rare ones clipped."""
-    low, high = _limits(made.heights, 1, 97)
-    return coloured(upright(made.heights), HEIGHT_COLOURS, low, max(high, low + 0.05))
+def _lines(
+    strips: list[NDArray], colour: tuple[int, int, int], draw_order: float
+) -> rr.LineStrips2D:
+    radius = rr.Radius.ui_points(1.5)
+    return rr.LineStrips2D(strips, colors=[colour], radii=radius, draw_order=draw_order)
 
 
 def cut_out(made: HeightMap, corner: NDArray, shape: tuple[int, ...]) -> HeightMap:
@@ -138,10 +148,24 @@ def cut_out(made: HeightMap, corner: NDArray, shape: tuple[int, ...]) -> HeightM
     return HeightMap(cells, made.origin + shift / made.cells_per_m, made.cells_per_m)
 
 
-def cost_picture(cost_map: CostMap) -> rr.EncodedImage:
-    """Low is dark, as in the paper; the worst tenth is clipped."""
-    low, high = _limits(cost_map.costs, 0, 90)
-    return coloured(upright(cost_map.costs), COST_COLOURS, low, high)
+def upright(cells: NDArray) -> NDArray:
+    """Cells [ix, iy] as a picture with x to the right and y up."""
+    return cells.T[::-1]
+
+
+def cell_pixels(
+    points: NDArray, origin: NDArray, cells_per_m: float, rows: int
+) -> NDArray[np.float32]:
+    """(N, 2) pixels of points (N, 2) [m] on the picture of a grid.
+
+    Args:
+        points: Points in the frame of the grid [m].
+        origin: (2,) centre of cell [0, 0] [m].
+        cells_per_m: Resolution.
+        rows: Height of the picture: cells along y.
+    """
+    cells = (np.asarray(points, np.float64) - origin) * cells_per_m + 0.5
+    return np.stack([cells[:, 0], rows - cells[:, 1]], axis=1).astype(np.float32)
 
 
 def on_costs(points_ground: NDArray, cost_map: CostMap) -> NDArray[np.float32]:
@@ -156,12 +180,3 @@ def ellipse_points(mean: NDArray, covariance: NDArray) -> NDArray[np.float64]:
     angle = np.linspace(0, 2 * np.pi, ELLIPSE_STEPS + 1)
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     return mean + SIGMAS * (circle * np.sqrt(np.maximum(variances, 0))) @ axes.T
-
-
-def _limits(cells: NDArray, low: float, high: float) -> tuple[float, float]:
-    """Percentiles of what is there."""
-    finite = cells[np.isfinite(cells)]
-    if len(finite) == 0:
-        return 0.0, 1.0
-    lowest, highest = np.percentile(finite, [low, high])
-    return float(lowest), float(highest)

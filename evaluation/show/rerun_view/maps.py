@@ -1,4 +1,4 @@
-"""The ground robot's map, and the aerial surface that lands on it as it is aligned."""
+"""The ground robot's map, the aerial surfaces, and their alignment."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from airground.core.messages import GroundImage
 from airground.core.se3 import SE3, interpolate
 from airground.core.voxel_map import VoxelMap
 from evaluation.run.onlooker import Seen
+from evaluation.show.figures.landing import eased
 from evaluation.show.figures.scene_pictures import GROUND_COLOUR, tinted
 from evaluation.show.rerun_view.sensor_stream import (
     GROUND,
@@ -30,18 +31,19 @@ from evaluation.show.rerun_view.sensor_stream import (
 
 SURFACE_COLOUR = (255, 150, 40)
 GLIDE_NS, GLIDE_STEPS = 400_000_000, 8
-"""Alignment takes no sensor time; its surface is drawn gliding from belief to alignment."""
+"""Duration [ns] and steps in which a surface is drawn moving from belief to alignment; alignment
+itself takes no sensor time."""
 FIRST_STRIDE_PX = 6
-"""Of a keyframe's depth, while there is no fused map."""
+"""Stride in a keyframe's depth while there is no fused map: enough points for a viewer."""
 
 
 class Maps:
-    """Clouds of both robots, thinned to what an eye tells apart.
+    """Clouds of both robots, thinned for the viewer.
 
     Args:
-        stream: To draw on.
-        level: How often and how finely.
-        ground_camera: That of the ground robot.
+        stream: Output.
+        level: Rate and spacing.
+        ground_camera: Camera of the ground robot.
     """
 
     def __init__(self, stream: SensorStream, level: Level, ground_camera: PinholeCamera) -> None:
@@ -55,7 +57,7 @@ class Maps:
         stream.put_in_frame(SURFACE, "mav/surface")
 
     def see(self, seen: Seen) -> None:
-        """Draw what joined a map."""
+        """Draw a change of a map."""
         stamp_ns = seen.event.stamp_ns
         match seen.event:
             case GroundMapExtended() if self._first is not None:
@@ -84,7 +86,7 @@ class Maps:
             self._stream.log(stamp_ns, "ground/map", self._points(cloud, GROUND_COLOUR))
 
     def _draw_surface(self, seen: Seen, stamp_ns: int) -> None:
-        """The newest surface where the particles have it; nowhere if they do not agree."""
+        """The newest surface as placed by the particles; removed if they did not converge."""
         if self._T_ground_surface is None or seen.sighting is None:
             self._stream.log(stamp_ns, "mav/surface", rr.Clear(recursive=False))
             return
@@ -93,17 +95,16 @@ class Maps:
         self._stream.log(stamp_ns, "mav/surface", self._points(cloud, SURFACE_COLOUR))
 
     def _glide(self, stamp_ns: int, T_ground_mav: SE3) -> None:
-        """Land the surface, and put all that the MAV has where the alignment says."""
+        """Move the surface to the alignment, and the MAV's map at once."""
         start = self._T_ground_surface or T_ground_mav
         for step in range(1, GLIDE_STEPS + 1):
             share = step / GLIDE_STEPS
-            eased = share * share * (3 - 2 * share)
             then_ns = stamp_ns + round(share * GLIDE_NS)
-            self._place(then_ns, SURFACE, interpolate(start, T_ground_mav, eased))
+            self._place(then_ns, SURFACE, interpolate(start, T_ground_mav, eased(share)))
         self._place(stamp_ns, MAV, T_ground_mav)
 
     def _draw_aerial(self, seen: Seen, stamp_ns: int) -> None:
-        """All that was added so far, from the moment when the surface has landed."""
+        """All aerial points so far, from the end of the newest surface's motion on."""
         assert seen.sighting is not None
         cloud = seen.sighting.surface.cloud_mav
         self._aerial.add(cloud.points, cloud.colours)
@@ -122,11 +123,11 @@ class Maps:
 
 
 class FirstKeyframes:
-    """The ground robot's depth until its map is first fused, as the MAV's first surface comes.
+    """The ground robot's depth until its map is first fused, for the MAV's first surface.
 
     Args:
-        camera: Of the depth images.
-        voxel_m: Points are this far apart.
+        camera: Camera of the depth images.
+        voxel_m: Spacing of the points [m].
     """
 
     def __init__(self, camera: PinholeCamera, voxel_m: float) -> None:
@@ -134,7 +135,7 @@ class FirstKeyframes:
         self._voxels = VoxelMap(voxel_m)
 
     def add(self, image: GroundImage, T_ground_camera: SE3) -> None:
-        """Take in a keyframe."""
+        """Add a keyframe."""
         depth = image.depth[::FIRST_STRIDE_PX, ::FIRST_STRIDE_PX].ravel()
         colours = image.colour[::FIRST_STRIDE_PX, ::FIRST_STRIDE_PX].reshape(-1, 3)
         known = np.isfinite(depth)
@@ -142,12 +143,12 @@ class FirstKeyframes:
         self._voxels.add(points, colours[known])
 
     def cloud(self) -> PointCloud:
-        """All of it."""
+        """All points."""
         return self._voxels.cloud()
 
 
 def thinned(cloud: PointCloud, voxel_m: float) -> PointCloud:
-    """One mean point a cube of this side [m]."""
+    """One mean point per cube of this side [m]."""
     voxels = VoxelMap(voxel_m)
     voxels.add(cloud.points, cloud.colours)
     return voxels.cloud()

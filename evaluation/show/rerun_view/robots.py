@@ -1,4 +1,4 @@
-"""Where each robot believes to be, its path, and what is true."""
+"""Estimated and true cameras with their paths, and the true scene."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from airground.core.events import GroundTracked, MavTracked
 from airground.core.messages import RobotCalibration
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
-from airground.tracking import TrackedFrame
 from evaluation.run.onlooker import Seen
 from evaluation.show.rerun_view.images import pinhole
 from evaluation.show.rerun_view.sensor_stream import (
@@ -21,6 +20,7 @@ from evaluation.show.rerun_view.sensor_stream import (
     PATH_COLOUR,
     ROBOT,
     TRUTH,
+    TRUTH_COLOUR,
     WORLD,
     Level,
     Pace,
@@ -31,45 +31,14 @@ from evaluation.show.rerun_view.sensor_stream import (
 from sim.recording.truth import Truth
 
 PATH_RADIUS_M = 0.008
+TRUE_RADIUS_M = 0.004
+"""Radius of a true path: thin, so that it lies inside the estimated one where both agree."""
 STEP_NS = 100_000_000
-"""Points of a path are this far apart."""
+"""Time between points of a path."""
 REDRAWN_HZ = 1.0
-"""A path is drawn as a whole, so that its cost grows with its square."""
-
-
-class Robots:
-    """Both cameras and their paths, each in its robot's map.
-
-    Args:
-        stream: To draw on.
-        level: How often.
-    """
-
-    def __init__(self, stream: SensorStream, level: Level) -> None:
-        self._stream = stream
-        self._paths = {robot: GrowingPath() for robot in Source}
-        self._pose_pace = {robot: Pace(level.pose_hz) for robot in Source}
-        self._path_pace = {robot: Pace(REDRAWN_HZ) for robot in Source}
-        for robot in ROBOT.values():
-            stream.put_in_frame(robot, f"{robot}/path")
-
-    def see(self, seen: Seen) -> None:
-        """Draw the pose of an image that was tracked."""
-        if isinstance(seen.event, MavTracked | GroundTracked):
-            assert seen.frame.pose.T_map_camera is not None
-            self._draw(seen.frame, seen.frame.pose.T_map_camera)
-
-    def _draw(self, frame: TrackedFrame, T_map_camera: SE3) -> None:
-        robot, stamp_ns = frame.robot, frame.stamp_ns
-        name, path = ROBOT[robot], self._paths[robot]
-        if frame.trajectory is not None:
-            path.follow(frame.trajectory)
-        path.add(stamp_ns, T_map_camera.translation)
-        if self._pose_pace[robot].due(stamp_ns):
-            placed = transform(T_map_camera, name, camera_frame(name))
-            self._stream.log(stamp_ns, f"{name}/camera", placed)
-        if self._path_pace[robot].due(stamp_ns):
-            self._stream.log(stamp_ns, f"{name}/path", path.drawn(PATH_COLOUR[robot]))
+"""A path is drawn as a whole, so that its cost grows with the square of its length."""
+SCENE = f"{TRUTH}/scene"
+SCENE_COLOUR = (190, 186, 178)
 
 
 class GrowingPath:
@@ -80,13 +49,13 @@ class GrowingPath:
         self._points: list[NDArray[np.float64]] = []
 
     def add(self, stamp_ns: int, position: NDArray[np.float64]) -> None:
-        """Go on to here."""
+        """Continue the path to a position."""
         if not self._stamps_ns or stamp_ns - self._stamps_ns[-1] >= STEP_NS:
             self._stamps_ns.append(stamp_ns)
             self._points.append(position)
 
     def follow(self, trajectory: Trajectory) -> None:
-        """The way so far was another one; points that it does not tell of stay."""
+        """Move the points to a corrected trajectory; points without a pose in it stay."""
         index = np.searchsorted(trajectory.stamps_ns, self._stamps_ns)
         for at, (stamp, i) in enumerate(zip(self._stamps_ns, index, strict=True)):
             if i < len(trajectory) and trajectory.stamps_ns[i] == stamp:
@@ -95,26 +64,87 @@ class GrowingPath:
     def drawn(
         self, colour: tuple[int, int, int], radius_m: float = PATH_RADIUS_M
     ) -> rr.LineStrips3D:
-        """As one line."""
+        """The path as one line."""
         points = np.array(self._points, np.float32).reshape(-1, 3)
         return rr.LineStrips3D([points], colors=[colour], radii=[radius_m])
 
 
-COLOUR = (255, 60, 200)
-THIN_M = 0.004
-"""Of a true path: it lies within the estimated one, and shows where they part."""
-SCENE = f"{TRUTH}/scene"
-SCENE_COLOUR = (190, 186, 178)
+class MovingCamera:
+    """A camera and its path, drawn at the rates of a level.
+
+    Args:
+        stream: Output.
+        level: Rates.
+        frames: Names of the frame that it moves in, and of its own frame.
+        entities: Entities of the camera and of the path.
+        colour: Colour of the path.
+        radius_m: Radius of the path [m].
+    """
+
+    def __init__(
+        self,
+        stream: SensorStream,
+        level: Level,
+        frames: tuple[str, str],
+        entities: tuple[str, str],
+        colour: tuple[int, int, int],
+        radius_m: float = PATH_RADIUS_M,
+    ) -> None:
+        self.path = GrowingPath()
+        self._stream, self._frames, self._entities = stream, frames, entities
+        self._look = colour, radius_m
+        self._pose_pace, self._path_pace = Pace(level.pose_hz), Pace(REDRAWN_HZ)
+        stream.put_in_frame(frames[0], entities[1])
+
+    def draw(self, stamp_ns: int, T_frame_camera: SE3) -> None:
+        """Draw one pose."""
+        self.path.add(stamp_ns, T_frame_camera.translation)
+        if self._pose_pace.due(stamp_ns):
+            placed = transform(T_frame_camera, *self._frames)
+            self._stream.log(stamp_ns, self._entities[0], placed)
+        if self._path_pace.due(stamp_ns):
+            self._stream.log(stamp_ns, self._entities[1], self.path.drawn(*self._look))
+
+
+class Robots:
+    """Both cameras and their paths, each in its robot's map.
+
+    Args:
+        stream: Output.
+        level: Rates.
+    """
+
+    def __init__(self, stream: SensorStream, level: Level) -> None:
+        self._cameras = {
+            robot: MovingCamera(
+                stream,
+                level,
+                (name, camera_frame(name)),
+                (f"{name}/camera", f"{name}/path"),
+                PATH_COLOUR[robot],
+            )
+            for robot, name in ROBOT.items()
+        }
+
+    def see(self, seen: Seen) -> None:
+        """Draw the pose of a tracked image."""
+        frame = seen.frame
+        if isinstance(seen.event, MavTracked | GroundTracked):
+            assert frame.pose.T_map_camera is not None
+            camera = self._cameras[frame.robot]
+            if frame.trajectory is not None:
+                camera.path.follow(frame.trajectory)
+            camera.draw(frame.stamp_ns, frame.pose.T_map_camera)
 
 
 class TrueRobots:
-    """Both robots where they really are.
+    """True cameras and their paths, and the true scene.
 
     Args:
-        stream: To draw on.
-        level: How often.
-        truth: What is true.
-        calibrations: Of the robots, for the frustums' shape.
+        stream: Output.
+        level: Rates.
+        truth: Source of the poses and the scene.
+        calibrations: Calibration of each robot, which shapes its frustum.
     """
 
     def __init__(
@@ -125,42 +155,35 @@ class TrueRobots:
         calibrations: Mapping[Source, RobotCalibration],
     ) -> None:
         self._stream, self._truth = stream, truth
-        self._pace = {robot: Pace(level.pose_hz) for robot in Source}
-        self._path_pace = {robot: Pace(REDRAWN_HZ) for robot in Source}
-        self._paths = {robot: GrowingPath() for robot in Source}
+        self._cameras: dict[Source, MovingCamera] = {}
         self._anchored = False
         for robot, calibration in calibrations.items():
-            name = ROBOT[robot]
-            frames = (_camera_frame(name), f"true_{name}_image")
-            stream.put_in_frame(WORLD, f"{TRUTH}/{name}/path")
-            lens = pinhole(calibration.camera, 1.0, frames, COLOUR)
-            stream.log_always(f"{TRUTH}/{name}/camera", lens)
+            frame, entity = f"true_{ROBOT[robot]}_camera", f"{TRUTH}/{ROBOT[robot]}"
+            self._cameras[robot] = MovingCamera(
+                stream,
+                level,
+                (WORLD, frame),
+                (f"{entity}/camera/pose", f"{entity}/path"),
+                TRUTH_COLOUR,
+                TRUE_RADIUS_M,
+            )
+            frames = frame, f"true_{ROBOT[robot]}_image"
+            lens = pinhole(calibration.camera, 1.0, frames, TRUTH_COLOUR)
+            stream.log_always(f"{entity}/camera", lens)
         self._draw_scene()
 
     def see(self, seen: Seen) -> None:
-        """Draw where a camera was that was tracked; where one was lost, too few would ask."""
-        if isinstance(seen.event, GroundTracked) and not self._anchored:
-            self._anchor(seen.event.stamp_ns, seen.event.T_ground_camera)
-        if isinstance(seen.event, GroundTracked | MavTracked):
-            self._draw(seen.frame.robot, seen.event.stamp_ns)
-
-    def _draw(self, robot: Source, stamp_ns: int) -> None:
-        name, path = ROBOT[robot], self._paths[robot]
-        T_world_camera = self._truth.T_world_camera(
-            "mav" if robot == Source.MAV else "ground", stamp_ns
-        )
-        path.add(stamp_ns, T_world_camera.translation)
-        if self._pace[robot].due(stamp_ns):
-            placed = transform(T_world_camera, WORLD, _camera_frame(name))
-            self._stream.log(stamp_ns, f"{TRUTH}/{name}/camera/pose", placed)
-        if self._path_pace[robot].due(stamp_ns):
-            self._stream.log(stamp_ns, f"{TRUTH}/{name}/path", path.drawn(COLOUR, THIN_M))
-
-    def _anchor(self, stamp_ns: int, T_ground_camera: SE3) -> None:
-        self._anchored = True
-        T_world_camera = self._truth.T_world_ground_camera(stamp_ns)
-        T_ground_world = T_ground_camera @ T_world_camera.inverse()
-        self._stream.log_always(f"{TRUTH}/world", transform(T_ground_world, GROUND, WORLD))
+        """Draw the true pose of a tracked image."""
+        event = seen.event
+        if isinstance(event, GroundTracked) and not self._anchored:
+            self._anchored = True
+            T_world_camera = self._truth.T_world_ground_camera(event.stamp_ns)
+            T_ground_world = event.T_ground_camera @ T_world_camera.inverse()
+            self._stream.log_always(f"{TRUTH}/world", transform(T_ground_world, GROUND, WORLD))
+        if isinstance(event, GroundTracked | MavTracked):
+            robot = seen.frame.robot
+            T_world_camera = self._truth.T_world_camera(ROBOT[robot], event.stamp_ns)
+            self._cameras[robot].draw(event.stamp_ns, T_world_camera)
 
     def _draw_scene(self) -> None:
         mesh = self._truth.mesh
@@ -175,7 +198,3 @@ class TrueRobots:
             albedo_factor=SCENE_COLOUR,
         )
         self._stream.log_always(SCENE, faces)
-
-
-def _camera_frame(name: str) -> str:
-    return f"true_{name}_camera"

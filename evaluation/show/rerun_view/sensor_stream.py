@@ -1,4 +1,4 @@
-"""The stream that all drawing goes to: one timeline, its level of detail, its entity names."""
+"""The output of all drawing: one timeline, its level of detail, and names of frames."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+from matplotlib.colors import to_rgb
 
 from airground.core.cloud import Source
 from airground.core.se3 import SE3
@@ -18,23 +19,31 @@ from evaluation.show.figures.scene_pictures import GROUND_PATH, MAV_PATH
 logger = logging.getLogger(__name__)
 
 APPLICATION = "airground"
-PATH_COLOUR = {Source.GROUND: GROUND_PATH, Source.MAV: MAV_PATH}
 TIMELINE = "sensor_time"
 
+GROUND, MAV, SURFACE, WORLD, COSTS = "ground", "mav", "surface", "world", "cost_map"
+"""Frames: both robots' maps, the newest aerial surface, the true world, pixels of the cost map."""
+ROBOT: dict[Source, Literal["mav", "ground"]] = {Source.GROUND: "ground", Source.MAV: "mav"}
+"""A robot's name, which is also that of its map's frame."""
+TRUTH = "/truth"
+"""Root of all entities that no robot has access to."""
+PATH_COLOUR = {Source.GROUND: GROUND_PATH, Source.MAV: MAV_PATH}
+TRUTH_COLOUR = (255, 60, 200)
+
 _FEW_CHUNKS = rr.ChunkBatcherConfig(flush_tick=2.0, flush_num_bytes=4 << 20)
-"""A viewer goes slow over many small chunks, not over much data."""
+"""Many small chunks slow a viewer down, not the amount of data."""
 _AT_ONCE = rr.ChunkBatcherConfig(flush_tick=0.05)
 
 
 class SensorStream:
-    """Writes to a file, and to a viewer where one listens.
+    """Writes to a file, and to a viewer if there is one.
 
-    The layout lies in the file, which therefore opens the same way in any viewer.
+    The file contains the layout, so that every viewer opens it in the same way.
 
     Args:
         path: The .rrd file to write.
-        name: Of the recording, as the viewer shows it.
-        layout: Where the viewer shows what.
+        name: Name of the recording in the viewer.
+        layout: Panels of the viewer.
         viewer: Address of a viewer that listens ("rerun+http://..."); None for none.
     """
 
@@ -42,7 +51,7 @@ class SensorStream:
         self, path: Path, name: str, layout: rrb.Blueprint, viewer: str | None = None
     ) -> None:
         batches = _FEW_CHUNKS if viewer is None else _AT_ONCE
-        # Its properties hold the time of day: the only bytes that would differ between runs.
+        # Properties contain the time of day, the only bytes that would differ between runs.
         self._stream = rr.RecordingStream(
             APPLICATION, recording_id=name, send_properties=False, batcher_config=batches
         )
@@ -54,31 +63,31 @@ class SensorStream:
         self._stream.send_recording_name(name)
 
     def log(self, stamp_ns: int, entity: str, *what: rr.AsComponents) -> None:
-        """Say what an entity is from `stamp_ns` on (sensor time)."""
+        """Set an entity from `stamp_ns` on (sensor time)."""
         self._stream.set_time(TIMELINE, duration=np.timedelta64(stamp_ns, "ns"))
         self._stream.log(entity, *what)
 
     def log_always(self, entity: str, *what: rr.AsComponents) -> None:
-        """Say what an entity is at all times."""
+        """Set an entity for all times."""
         self._stream.log(entity, *what, static=True)
 
     def put_in_frame(self, frame: str, *entities: str) -> None:
-        """What is drawn under these entities has coordinates in a named frame."""
+        """Give the coordinates of these entities a named frame."""
         for entity in entities:
             self.log_always(entity, rr.CoordinateFrame(frame))
 
     def close(self) -> None:
-        """Write what is still in memory, and end the file."""
+        """Write the rest, and end the file."""
         try:
             self._stream.flush()
         except RuntimeError as error:
-            # A viewer that was closed meanwhile; the file gets its data all the same.
+            # The viewer was closed; the file is complete nevertheless.
             logger.warning("the viewer is gone: %s", error)
         self._stream.disconnect()
 
 
 def transform(T_parent_child: SE3, parent: str, child: str) -> rr.Transform3D:
-    """A frame's place in another, both by name."""
+    """The pose of a named frame in another."""
     return rr.Transform3D(
         translation=T_parent_child.translation,
         quaternion=rr.Quaternion(xyzw=T_parent_child.quaternion_xyzw()),
@@ -92,16 +101,16 @@ LevelName = Literal["summary", "stages", "all"]
 
 @dataclass(frozen=True)
 class Level:
-    """What a recording for the viewer holds of each second.
+    """Level of detail of a recording for the viewer.
 
     Attributes:
-        pose_hz: Poses, and points of the curves.
-        image_hz: Images of each robot with their corners.
-        image_scale: Their size, as a share of the camera's.
-        jpeg_quality: Their quality, 1 to 100.
-        depth_map_hz: Depth maps and their errors.
-        cloud_hz: Both maps, each drawn anew as a whole.
-        voxel_m: Points of maps and surfaces are this far apart [m].
+        pose_hz: Rate of poses, and of points of the curves [Hz].
+        image_hz: Rate of each robot's images with their corners [Hz].
+        image_scale: Size of images, as a share of the camera's.
+        jpeg_quality: Quality of images, 1 to 100.
+        depth_map_hz: Rate of depth maps and their errors [Hz].
+        cloud_hz: Rate of both maps, each drawn as a whole [Hz].
+        voxel_m: Spacing of the points of maps and surfaces [m].
     """
 
     pose_hz: float
@@ -121,33 +130,30 @@ LEVELS: dict[LevelName, Level] = {
 
 
 class Pace:
-    """Lets through so many a second, by sensor time.
-
-    Args:
-        hz: How many.
-    """
+    """Selects events at a rate [Hz] of sensor time."""
 
     def __init__(self, hz: float) -> None:
-        # Half a frame of 30 Hz early is in time: frames do not come at whole multiples.
+        # Half a frame of 30 Hz early is in time: stamps are no whole multiples of the period.
         self._apart_ns = round(1e9 / hz) - 16_000_000
         self._last_ns: int | None = None
 
     def due(self, stamp_ns: int) -> bool:
-        """Whether enough time has passed; if so, the next wait begins."""
+        """Whether the period has passed since the last selected stamp; if so, select this one."""
         if self._last_ns is not None and stamp_ns - self._last_ns < self._apart_ns:
             return False
         self._last_ns = stamp_ns
         return True
 
 
-GROUND, MAV, SURFACE, WORLD, COSTS = "ground", "mav", "surface", "world", "cost_map"
-"""Frames: both robots' maps, the newest aerial surface, the true world, pixels of the cost map."""
+def paces(hz: float) -> dict[Source, Pace]:
+    """A pace for each robot."""
+    return {robot: Pace(hz) for robot in Source}
 
-ROBOT = {Source.GROUND: GROUND, Source.MAV: MAV}
-"""A robot's name, which is also that of its map's frame."""
 
-TRUTH = "/truth"
-"""All that is true and that no robot knows."""
+def rgb(colour: str) -> tuple[int, int, int]:
+    """A colour such as "#35C46A" as the viewer reads it, each part from 0 to 255."""
+    red, green, blue = np.rint(255 * np.array(to_rgb(colour))).astype(int).tolist()
+    return red, green, blue
 
 
 def camera_frame(robot: str) -> str:

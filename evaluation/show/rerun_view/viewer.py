@@ -1,8 +1,7 @@
-"""Rerun's own programs: its viewer on this screen or in a browser, on loopback only.
+"""Rerun's own program: its viewer in a window or in a browser, on loopback only.
 
-What the SDK serves listens on every interface and cannot be told otherwise; rerun's program
-can (`--bind`). So that program serves, and nothing here calls `serve_grpc`,
-`serve_web_viewer` or `spawn`.
+The SDK's servers (`serve_grpc`, `serve_web_viewer`, `spawn`) listen on every interface without
+an option to change that. Rerun's program has one (`--bind`), so that program serves.
 """
 
 from __future__ import annotations
@@ -23,32 +22,28 @@ from airground.errors import AirgroundError, InputError
 
 LOOPBACK = "127.0.0.1"
 START_S = 30.0
-"""A viewer that does not listen by then will not."""
+"""Time in which a viewer must start to listen [s]."""
 STAY_S = 3.0
-"""A viewer listens before it draws: one that cannot draw here ends within this time."""
+"""A viewer listens before it draws; one that cannot draw ends within this time [s]."""
 STOP_S = 5.0
+"""Time to end after a request, before it is killed [s]."""
 
 
 @dataclass(frozen=True)
 class Ports:
-    """Where a viewer listens.
-
-    Attributes:
-        data: For what it shows (gRPC).
-        web: For the page of the web viewer.
-    """
+    """Ports of a viewer: for its data (gRPC), and for the page of the web viewer."""
 
     data: int
     web: int
 
     @property
     def sink(self) -> str:
-        """Where a running pipeline sends what it draws."""
+        """Address for the data of a running pipeline."""
         return f"rerun+http://{LOOPBACK}:{self.data}/proxy"
 
     @property
     def page(self) -> str:
-        """What to open in a browser."""
+        """Address of the page for a browser."""
         source = quote(f"rerun+http://localhost:{self.data}/proxy", safe="")
         return f"http://localhost:{self.web}/?url={source}"
 
@@ -78,10 +73,10 @@ def show(file: Path) -> int:
 
 @contextmanager
 def serving(ports: Ports, file: Path | None = None) -> Iterator[subprocess.Popen[bytes]]:
-    """Serve the web viewer with a file, or with what a pipeline sends, while the block runs.
+    """Serve the web viewer while the block runs, with a file or with a pipeline's data.
 
     Raises:
-        AirgroundError: It does not start.
+        AirgroundError: The viewer does not start.
     """
     shown = () if file is None else (str(file),)
     web = ("--serve-web", "--web-viewer-port", str(ports.web))
@@ -93,10 +88,10 @@ def serving(ports: Ports, file: Path | None = None) -> Iterator[subprocess.Popen
 
 @contextmanager
 def window(ports: Ports, *options: str) -> Iterator[subprocess.Popen[bytes]]:
-    """A viewer that waits for what a pipeline sends, and stays open after the block.
+    """A window for a pipeline's data, which stays open after the block.
 
     Raises:
-        AirgroundError: It does not start, or cannot draw.
+        AirgroundError: The viewer does not start, or cannot draw.
     """
     viewer = _start(*options, "--expect-data-soon", *_listening(ports))
     try:
@@ -109,10 +104,10 @@ def window(ports: Ports, *options: str) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def save(file: Path, out: Path) -> None:
-    """Copy a file with its layout, its pieces joined to play smoothly.
+    """Copy a file with its layout, with its chunks joined so that it plays smoothly.
 
     Raises:
-        InputError: `file` is none of rerun's, or `out` exists or cannot be written.
+        InputError: `file` is no recording of rerun, or `out` exists or cannot be written.
     """
     if out.exists():
         raise InputError(f"--save {out}: exists already; name a new file, or remove this one")
@@ -128,10 +123,10 @@ def save(file: Path, out: Path) -> None:
 
 
 def verify(file: Path) -> None:
-    """Let rerun check a file.
+    """Check a file by rerun.
 
     Raises:
-        InputError: It does not pass.
+        InputError: The file does not pass.
     """
     _carry_out("rrd", "verify", str(file))
 
@@ -167,7 +162,7 @@ def _running(*words: str) -> Iterator[subprocess.Popen[bytes]]:
 
 
 def _start(*words: str) -> subprocess.Popen[bytes]:
-    # Its log would lie over ours; what goes wrong shows in its exit code.
+    # Its log would mix with ours; its exit code reports a failure.
     return subprocess.Popen(
         [str(program()), *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     )

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from airground.core.belief import HeightMap
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
-from evaluation.show.rerun_view.depth_maps import SHADES, cell_pixels, shade_index, upright
-from evaluation.show.rerun_view.localization import cut_out
+from evaluation.show.rerun_view.images import SHADES, shade_index
+from evaluation.show.rerun_view.localization import cell_pixels, cut_out, upright
 from evaluation.show.rerun_view.robots import STEP_NS, GrowingPath
 from evaluation.show.rerun_view.sensor_stream import Pace
 

@@ -14,9 +14,9 @@ import pytest
 from PIL import Image
 
 from airground.core.se3 import SE3
-from evaluation.show.rerun_view.layout import layout
 from evaluation.show.rerun_view.localization import ellipse_points, on_costs
 from evaluation.show.rerun_view.maps import GLIDE_NS
+from evaluation.show.rerun_view.run_view import layout
 from evaluation.show.rerun_view.sensor_stream import LEVELS
 from tests.evaluation.show.scripted_run import (
     BELIEF,
