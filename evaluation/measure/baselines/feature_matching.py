@@ -16,9 +16,9 @@ REPROJECTION_PX = 4.0
 ITERATIONS = 5_000
 CONFIDENCE = 0.9999
 SAME_PLACE_PX = 4.0
-"""Matches that begin and end in the same squares of this side count once."""
+"""Matches whose ends lie in the same squares of this side count once."""
 MIN_INLIERS = 12
-"""Fewer matches that agree on a pose are taken for chance."""
+"""Fewer matches that agree on a pose may agree by chance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Matches:
 
     Attributes:
         aerial_px, ground_px: (N, 2) pixels (x, y) in the two images.
-        points_ground: (N, 3) where the ground robot's depth puts them, in `ground` [m].
+        points_ground: (N, 3) their points by the ground robot's depth, in `ground` [m].
     """
 
     aerial_px: NDArray[np.float64]
@@ -40,8 +40,8 @@ class Located:
     """A camera pose and the matches that agree with it.
 
     Attributes:
-        T_ground_camera: Pose of the MAV's camera, None where too few agree on any.
-        inliers: (N,) which of all matches agree, in the order of the views.
+        T_ground_camera: Pose of the MAV's camera, None if too few matches agree.
+        inliers: (N,) whether each match agrees, in the order of the views.
     """
 
     T_ground_camera: SE3 | None
@@ -49,11 +49,11 @@ class Located:
 
 
 def located_by_appearance(given: Given, detector: cv2.Feature2D) -> Answer:
-    """Match the MAV's image with each ground view, and find the pose that all matches give.
+    """Match the MAV's image with each ground view, and estimate the pose from all matches.
 
     Args:
-        given: With views.
-        detector: Finds and describes features in a grey image; compared by L2 distance.
+        given: Input with views.
+        detector: Detector of features in a grey image; descriptors are compared by L2 distance.
     """
     if given.aerial_view is None or not given.ground_views:
         return Answer(None, "no image of the ground robot looks at what the MAV sees")
@@ -119,7 +119,7 @@ def locate_camera(aerial: View, matches: list[Matches]) -> Located:
 def _features(
     grey: NDArray[np.uint8], detector: cv2.Feature2D
 ) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-    """(N, 2) pixels (x, y) and (N, D) descriptors; those of simulated views may repeat."""
+    """(N, 2) pixels (x, y) and (N, D) descriptors; corners may repeat with ASIFT."""
     keypoints, words = detector.detectAndCompute(grey, None)
     if words is None or len(keypoints) == 0:
         return np.empty((0, 2)), np.empty((0, 128), np.float32)
@@ -127,9 +127,9 @@ def _features(
 
 
 def _distinct(aerial_px: NDArray, ground_px: NDArray) -> NDArray[np.int64]:
-    """Indices of matches (N, 2) between other pixels than those before them.
+    """Indices of the matches (N, 2) between other pixels than those before them.
 
-    Simulated views find one corner many times, which would pass for agreement.
+    ASIFT's simulated views detect one corner many times, which would look like agreement.
     """
     places = np.floor(np.hstack([aerial_px, ground_px]) / SAME_PLACE_PX).astype(np.int64)
     _, first = np.unique(places, axis=0, return_index=True)
@@ -152,7 +152,7 @@ def _points_map(view: View, pixels: NDArray) -> tuple[NDArray[np.float64], NDArr
 
 
 RATIO = 0.8
-"""A match must be this much nearer than the second best (Lowe, IJCV 2004, Sec. 7.1)."""
+"""Largest ratio of the distances of the best and second best match (Lowe, IJCV 2004, Sec. 7.1)."""
 _ROWS, _COLUMNS = 256, 2048  # so many products stay in the cache
 
 
@@ -185,7 +185,7 @@ def clear_matches(aerial: NDArray[np.float32], ground: NDArray[np.float32]) -> N
 
 @njit(cache=True, nogil=True)
 def _keep_nearest(products, ground_squared, start, two_least, best):  # type: ignore[no-untyped-def]
-    """Take in some more columns: squared distances, less what all of a row have in common."""
+    """Add some columns: squared distances, without the term that a row's have in common."""
     two = np.float32(2)
     for row in range(len(products)):
         first, second = two_least[row]
@@ -201,15 +201,15 @@ def _keep_nearest(products, ground_squared, start, two_least, best):  # type: ig
 
 
 def asift_detector() -> cv2.Feature2D:
-    """SIFT under the tilts and rotations that its authors advise, as OpenCV has them."""
+    """SIFT under the tilts and rotations that ASIFT's authors recommend, by OpenCV."""
     return cv2.AffineFeature.create(cv2.SIFT.create())
 
 
 def asift(given: Given) -> Answer:
-    """Where ASIFT features put the MAV's camera."""
+    """The MAV's camera by ASIFT features."""
     return located_by_appearance(given, asift_detector())
 
 
 def sift(given: Given) -> Answer:
-    """Where SIFT features put the MAV's camera."""
+    """The MAV's camera by SIFT features."""
     return located_by_appearance(given, cv2.SIFT.create())

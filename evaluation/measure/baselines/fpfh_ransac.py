@@ -23,18 +23,18 @@ from evaluation.measure.baselines.registration import (
 )
 
 SAMPLES = 100_000
-"""Triples of matches that are tried."""
+"""Number of triples of matches that are tried."""
 EDGE_SIMILARITY = 0.9
-"""Sides of the two triangles of a triple must agree this well, as Open3D's checker asks."""
+"""Least ratio of the sides of a triple's two triangles, as in Open3D's checker."""
 INLIER_M = 1.5 * VOXEL_M
 MIN_MATCHES = 10
 SCORED_AT_ONCE = 256
 
 
 def fpfh_ransac_icp(given: Given) -> Answer:
-    """Match features both ways, find the possible motion that most agree on, settle by ICP.
+    """Match features both ways, take the possible motion with most inliers, and refine by ICP.
 
-    RANSAC is written out here: Open3D's depends on the number of threads.
+    RANSAC is implemented here: Open3D's result depends on the number of threads.
     """
     refusal = too_few_points(given)
     if refusal:
@@ -69,7 +69,7 @@ def _featured(points: NDArray) -> tuple[NDArray[np.float64], o3d.pipelines.regis
     features = o3d.pipelines.registration.compute_fpfh_feature(
         cloud,
         search(FEATURE_RADIUS_M, 100),
-    )  # type: ignore[call-arg]  # its stub forgets a default
+    )  # type: ignore[call-arg]  # its stub lacks a default
     return kept, features
 
 
@@ -83,8 +83,8 @@ def ransac(
 
     Args:
         source, target: (N, 3) matched points [m].
-        possible: Which of rotations (B, 3, 3) are not ruled out.
-        rng: Draws the triples.
+        possible: Whether each of rotations (B, 3, 3) is possible.
+        rng: Randomness of the triples.
 
     Returns:
         T_target_source fitted to its inliers, None where no triple gives a possible one.

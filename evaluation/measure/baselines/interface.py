@@ -1,4 +1,4 @@
-"""What a baseline is given and what it answers; the truth is in neither."""
+"""Input and answer of a baseline, without the truth, and a baseline's entry in the table."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ class View:
     """An image, and the camera that took it.
 
     Attributes:
-        stamp_ns: Of the image.
-        camera: Its told intrinsics.
-        T_map_camera: Its pose in its robot's own map, by that robot's SLAM.
-        grey: (height, width) uint8.
-        depth: (height, width) float32 [m], NaN for none; None of a camera without depth.
+        stamp_ns: Stamp of the image [ns].
+        camera: Nominal intrinsics.
+        T_map_camera: Pose in the robot's own map, by that robot's SLAM.
+        grey: (height, width) uint8 image.
+        depth: (height, width) float32 depth [m], NaN where missing; None without depth camera.
     """
 
     stamp_ns: int
@@ -47,12 +47,12 @@ class Given:
 
     Attributes:
         sighting: Both maps at one time, and the heading by the magnetometers.
-        config: Resolution, search region and thresholds that ours uses.
-        rng: The one source of randomness.
-        prior: A first guess of T_ground_mav; None unless the baseline declares one.
+        config: Resolution, search region and thresholds of ours.
+        rng: The only source of randomness.
+        prior: Prior of T_ground_mav; None unless the baseline declares one.
         aerial_view: The MAV's reference image of the surface, its pose in `mav`; None unless
             the baseline declares views.
-        ground_views: Images of the ground robot by then, their poses in `ground`; empty
+        ground_views: Images of the ground robot up to that time, their poses in `ground`; empty
             unless the baseline declares views.
     """
 
@@ -66,11 +66,11 @@ class Given:
 
 @dataclass(frozen=True)
 class Answer:
-    """Where a baseline puts the MAV.
+    """A baseline's estimate of the MAV's pose.
 
     Attributes:
-        T_ground_mav: Its best guess, None where it has none.
-        refusal: Why it does not claim that guess; empty when it does.
+        T_ground_mav: Best estimate, None if there is none.
+        refusal: Reason why it is not claimed; empty if it is claimed.
     """
 
     T_ground_mav: SE3 | None
@@ -78,17 +78,17 @@ class Answer:
 
     def __post_init__(self) -> None:
         if self.T_ground_mav is None and not self.refusal:
-            raise ValueError("an answer without a pose must say why")
+            raise ValueError("an answer without a pose needs a reason")
 
     @property
     def claimed(self) -> bool:
-        """Whether it says that the MAV is there."""
+        """Whether the baseline commits itself to the estimate."""
         return not self.refusal
 
 
 Prior = Literal["none", "noisy", "truth"]
-"""What first guess a baseline gets: none, the true relation with the trials' noise (0.2 m and
-3 degrees per axis, Sec. VIII-D), or the true relation itself, which makes it an oracle."""
+"""Prior that a baseline gets: none, the true relation with the trials' noise (0.2 m and 3 degrees
+per axis, Sec. VIII-D), or the true relation itself, which makes it an oracle."""
 
 
 @dataclass(frozen=True)
@@ -96,14 +96,14 @@ class Baseline:
     """One row of the table.
 
     Attributes:
-        name: Of its metrics; letters, digits and underscores.
-        title: For people.
-        given: What it uses, in words.
+        name: Name in its metrics; letters, digits and underscores.
+        title: Name for readers.
+        given: Its input, in words.
         locate: Answers one sighting; abstains by an answer, never by an exception.
-        prior: The first guess that it gets.
-        views: Whether it gets both robots' images. Which of the ground robot's are near is
-            told by the noisy prior, which spares it a search that ours has to do.
-        module: What it imports beyond the core (the extra `baselines`); empty if nothing.
+        prior: Prior that it gets.
+        views: Whether it gets both robots' images. The noisy prior selects those of the ground
+            robot that are near, which saves it a search that ours has to do.
+        module: Module that it imports from the extra `baselines`; empty if none.
     """
 
     name: str

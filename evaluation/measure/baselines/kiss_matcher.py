@@ -23,18 +23,18 @@ if TYPE_CHECKING:
     from kiss_matcher import KISSMatcher
 
 MIN_INLIERS = 5
-"""Fewer, and its authors take a registration for failed."""
+"""With fewer its authors regard a registration as failed."""
 
 ABOVE_M = 10.0
-"""It turns normals to the origin, where it takes the sensor to be; both clouds are seen from
+"""Height of the sensor above a cloud [m]: normals are turned to it, and both clouds are seen from
 above."""
 
 
 def kiss_matcher_icp(given: Given) -> Answer:
     """Match Faster-PFH features, prune them by k-core, solve robustly, settle by ICP.
 
-    Its solver Quatro is told that both maps are level. Its own thinning is left out: it
-    orders points by the threads' speed, and everything after depends on the order.
+    Its solver Quatro assumes that both maps are level. Its own thinning is not used: the order
+    of its points depends on the threads' speed, and the result on the order.
     """
     refusal = too_few_points(given)
     if refusal:
@@ -70,20 +70,20 @@ def _unbound_matcher() -> KISSMatcher:
 
 @cache
 def _bind_to_one_thread() -> None:
-    """Use it once while this process has one core: TBB then gives it one thread for good.
+    """Use it once while this process has one core: TBB then keeps one thread for it.
 
-    Its threads settle ties by their speed: of 80 runs over the same clouds on a busy machine two
-    differed by millimetres.
+    With more, ties are resolved by the threads' speed: of 80 runs over the same clouds on a busy
+    machine two differed by millimetres.
     """
-    cores = {who: os.sched_getaffinity(who) for who in (0, os.getpid())}
+    cores = {pid: os.sched_getaffinity(pid) for pid in (0, os.getpid())}
     cloud = list(np.random.default_rng(0).uniform(-1, 1, (500, 3)).astype(np.float32))
     try:
-        for who, usable in cores.items():
-            os.sched_setaffinity(who, {min(usable)})
+        for pid, usable in cores.items():
+            os.sched_setaffinity(pid, {min(usable)})
         _unbound_matcher().estimate(cloud, cloud)
     finally:
-        for who, usable in cores.items():
-            os.sched_setaffinity(who, usable)
+        for pid, usable in cores.items():
+            os.sched_setaffinity(pid, usable)
 
 
 def _above(points: NDArray) -> NDArray[np.float64]:

@@ -17,14 +17,14 @@ from evaluation.measure.baselines.views import GroundViews, aerial_view
 
 @dataclass(frozen=True, eq=False)
 class MatchedImages:
-    """Of all ground views, the one with most matches that agree on a pose.
+    """The ground view with most matches that agree on a pose.
 
     Attributes:
-        aerial, ground: (h, w) uint8 grey.
+        aerial, ground: (h, w) uint8 grey images.
         aerial_px, ground_px: (N, 2) pixels (x, y) of the matches that pass the ratio test
             and have depth.
-        agrees: (N,) which of them agree with one pose of the MAV's camera.
-        views: How many ground views were matched.
+        agrees: (N,) whether each agrees with one pose of the MAV's camera.
+        views: Number of ground views that were matched.
         located: Whether enough matches agree, over all views, to claim that pose.
     """
 
@@ -53,10 +53,10 @@ def match_images(
     """Match one sighting's image by ASIFT; None where no ground view looks at the surface.
 
     Args:
-        recording: Where images are read from.
+        recording: Source of the images.
         ground_poses: Stamp and pose of the ground robot's tracked images.
-        sighting: What the MAV saw.
-        prior: About T_ground_mav; it chooses the ground views.
+        sighting: The MAV's surface and the ground map.
+        prior: Approximate T_ground_mav, which selects the ground views.
     """
     aerial = aerial_view(recording, sighting)
     views = GroundViews(recording, ground_poses).nearest(sighting, prior)

@@ -1,4 +1,4 @@
-"""Asks every baseline about the sightings of the refinement trials, and judges the answers."""
+"""Answers of every baseline to sightings of the refinement trials, and their errors."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from sim.recording.truth import Truth
 
 STAGE = "baseline"
 """Metrics are `NAME_claimed`, `NAME_horizontal_m`, `NAME_translation_m`, `NAME_rotation_deg` and
-`NAME_ms`; the note of `NAME_claimed` says why not. `NAME_missing` stands alone where what it
-imports is not installed."""
+`NAME_ms`; the note of `NAME_claimed` is the reason why not. `NAME_missing` stands alone where a
+module is not installed."""
 
 
 def add_baselines(
@@ -39,14 +39,14 @@ def add_baselines(
     """Write one answer of every baseline for some of the refinement trials.
 
     Args:
-        out: Takes rows of the stage "baseline"; trials have the numbers of the refinement's,
-            and the noisy prior is the very start of that trial.
-        recording: Where images are read from.
-        truth: Judges the answers, and makes the priors.
+        out: Takes rows of the stage "baseline", with the numbers of the refinement trials; the
+            noisy prior is the start of that trial.
+        recording: Source of the images.
+        truth: Truth for errors and priors.
         config: Search region and thresholds.
-        maps: What was mapped.
-        seed: Of the recording and the flight.
-        counts: Refinement trials, and how many of them are tried here.
+        maps: Sightings and tracked images.
+        seed: Seeds of the recording and the flight.
+        counts: Number of refinement trials, and how many of them are used here.
     """
     chosen = trial_sightings(len(maps.sightings), counts[0])
     ground_views = GroundViews(recording, maps.tracked["ground"].front_end.live_poses())
@@ -72,7 +72,7 @@ def ask_all(
     seed: tuple[int, int],
     trial: int,
 ) -> list[tuple[Answer, float]]:
-    """Each baseline's answer to one sighting, and its time [ms], reading images left out."""
+    """Each baseline's answer to one sighting, and its time without reading images [ms]."""
     true = true_T_ground_mav(sighting, truth)
     noisy = noisy_start(true, sighting.T_mav_camera, np.random.default_rng([*seed, 2, trial]))
     priors = {"none": None, "noisy": noisy, "truth": true}
@@ -116,7 +116,7 @@ def _add_answer(
 
 
 def _is_installed(baseline: Baseline) -> bool:
-    """Imports what it needs, so that the time of its first answer does not hold that."""
+    """Imports its module, so that the time of its first answer does not include that."""
     try:
         return not baseline.module or bool(importlib.import_module(baseline.module))
     except ImportError:

@@ -1,4 +1,4 @@
-"""What baselines on point clouds share: the searched map, ICP, its verdict, ICP from the prior."""
+"""Common parts of baselines on point clouds: the searched map, ICP, and whether it is claimed."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ MIN_POINTS = 200
 VOXEL_M = 0.05
 """Clouds are thinned to this for features: a tenth of the boxes' sides [m]."""
 NORMAL_RADIUS_M, FEATURE_RADIUS_M = 3 * VOXEL_M, 5 * VOXEL_M
-"""As both KISS-Matcher and Open3D's global registration advise."""
+"""As KISS-Matcher and Open3D's global registration recommend."""
 MAX_TURN_DEG = 15.0
-"""Both maps have z up, and magnetometers tell their headings; a motion that is turned by more
-is wrong."""
+"""Both maps have z up, and magnetometers give their headings: a motion turned by more is wrong."""
 
 
 def searched_ground(given: Given) -> NDArray[np.float64]:
@@ -40,8 +39,8 @@ def thinned(points: NDArray, voxel_m: float) -> NDArray[np.float64]:
 def settled_by_icp(given: Given, start: SE3) -> Answer:
     """Point-to-plane ICP of small_gicp, at the distances of ours: first wide, then narrow.
 
-    Claimed where more of the aerial points lie on the ground map than the maps must overlap,
-    inside the search region, and turned as gravity and the magnetometers say.
+    Claimed if the share of aerial points on the ground map reaches the least overlap, inside the
+    search region, with the rotation that gravity and the magnetometers give.
     """
     refinement = given.config.refinement
     aerial = small_gicp.voxelgrid_sampling(
@@ -74,16 +73,16 @@ def settled_by_icp(given: Given, start: SE3) -> Answer:
 
 
 def why_refused(given: Given, motion: SE3, share: float) -> str:
-    """One line on why a registration is not claimed; empty if it is.
+    """Reason why a registration is not claimed; empty if it is.
 
     Args:
         given: Search region and thresholds.
-        motion: T_ground_mav as registered.
-        share: Of the aerial points, those that lie on the ground map.
+        motion: Registered T_ground_mav.
+        share: Share of the aerial points that lie on the ground map.
     """
-    asked = given.config.localization.min_overlap
-    if share < asked:
-        return f"only {share:.0%} of the aerial points lie on the ground map, {asked:.0%} needed"
+    least = given.config.localization.min_overlap
+    if share < least:
+        return f"only {share:.0%} of the aerial points lie on the ground map, {least:.0%} needed"
     turn_deg = np.rad2deg(impossible_turn(given, motion.rotation[None])[0])
     if turn_deg > MAX_TURN_DEG:
         return f"turned by {turn_deg:.0f} deg from what gravity and the magnetometers say"
@@ -95,9 +94,9 @@ def why_refused(given: Given, motion: SE3, share: float) -> str:
 
 
 def impossible_turn(given: Given, rotations: NDArray) -> NDArray[np.float64]:
-    """(N,) angle between rotations (N, 3, 3) of `mav` to `ground` and what is known [rad].
+    """(N,) angle between rotations (N, 3, 3) of `mav` to `ground` and the known one [rad].
 
-    Where the heading is to be searched or unknown, only the vertical is known.
+    If the heading is searched or unknown, only the vertical is known.
     """
     heading = given.sighting.heading
     if given.config.localization.heading == "search" or heading is None:
@@ -109,7 +108,7 @@ def impossible_turn(given: Given, rotations: NDArray) -> NDArray[np.float64]:
 
 
 def too_few_points(given: Given) -> str:
-    """One line where a cloud is too small to register; empty otherwise."""
+    """Reason if a cloud is too small to register; empty otherwise."""
     for name, count in (
         ("aerial", len(given.sighting.surface.cloud_mav)),
         ("ground", len(searched_ground(given))),

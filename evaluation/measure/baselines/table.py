@@ -1,4 +1,4 @@
-"""Every baseline by name: a new one is a file of its own and a line here."""
+"""The table of baselines: a new one is a file of its own and a line here."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def first_belief(given: Given) -> Answer:
 
 
 def first_belief_refined(given: Given) -> Answer:
-    """The same, refined; claimed where both the particles and the refinement claim it."""
+    """Particles after one aerial map, refined; claimed if both steps claim it."""
     found = first_belief(given)
     if found.T_ground_mav is None:
         return found
@@ -48,7 +48,7 @@ def _refined(given: Given, start: SE3) -> Answer:
     return Answer(alignment.T_ground_mav, alignment.refusal)
 
 
-IMAGES = "images, the near ones told by the noisy prior; depth of the ground robot"
+IMAGES = "images near the noisy prior; depth of the ground robot"
 HEIGHTS = "height maps, heading, search region"
 CLOUDS = "clouds, vertical, heading, search region"
 

@@ -1,4 +1,4 @@
-"""The images that baselines of appearance get, read from the recording by their stamps."""
+"""Images for baselines by appearance, read from the recording by their stamps."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from airground.io.recording import Recording
 from evaluation.measure.baselines.interface import View
 
 VIEWS = 3
-"""Ground views a sighting."""
+"""Number of ground views per sighting."""
 CANDIDATE_STEP_S = 0.2
 APART_M, APART_DEG = 0.25, 10.0
-"""Ground views are at least this far apart or turned this far, to show different sides."""
+"""Least distance or turn between ground views, so that they show different sides."""
 MIN_DEPTH_M = 0.3
 SAMPLED_POINTS = 500
 
@@ -33,10 +33,10 @@ def aerial_view(recording: Recording, sighting: Sighting) -> View:
 
 @dataclass(frozen=True, eq=False)
 class GroundViews:
-    """Finds the ground robot's images that show best what the MAV sees.
+    """Selects the ground robot's images that show best what the MAV sees.
 
     Attributes:
-        recording: Where images are read from.
+        recording: Source of the images.
         poses: Stamp and T_ground_camera of the tracked images, by the robot's own SLAM.
     """
 
@@ -44,14 +44,14 @@ class GroundViews:
     poses: Sequence[tuple[int, SE3]]
 
     def nearest(self, sighting: Sighting, T_ground_mav: SE3) -> tuple[View, ...]:
-        """Images taken by then that look at the aerial surface most as the MAV does.
+        """Earlier images with the most similar view of the aerial surface to the MAV's.
 
         Args:
-            sighting: Its surface and its time.
-            T_ground_mav: About where the MAV is; it chooses the images and nothing else.
+            sighting: The surface and its time.
+            T_ground_mav: Approximate pose of the MAV, used for the selection only.
 
         Returns:
-            The best first; fewer than `VIEWS` where no others see the surface.
+            The best first; fewer than `VIEWS` if no others see the surface.
         """
         points = T_ground_mav @ _sampled(sighting.surface.cloud_mav.points)
         mav = (T_ground_mav @ sighting.surface.T_mav_camera).translation
@@ -89,10 +89,10 @@ def _sampled(points: NDArray) -> NDArray:
 
 
 def _likeness(points: NDArray, mav: NDArray, camera: PinholeCamera, pose: SE3) -> float:
-    """How much of the surface a ground camera sees, and how nearly from the MAV's direction.
+    """Similarity of a ground camera's view of the surface to the MAV's.
 
     The mean over the points (N, 3) of the cosine between both lines of sight, 0 where the
-    point is out of the image; blocked lines of sight are not known here.
+    point is outside the image; occlusion is not considered.
     """
     if len(points) == 0:
         return 0.0

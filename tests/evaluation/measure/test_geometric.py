@@ -141,8 +141,8 @@ def test_what_is_known_of_the_turn_follows_the_heading_word() -> None:
     assert impossible_turn(searched, tilted)[0] == pytest.approx(0.5)
 
 
-def test_answer_without_pose_must_say_why() -> None:
-    with pytest.raises(ValueError, match="say why"):
+def test_an_answer_without_pose_needs_a_reason() -> None:
+    with pytest.raises(ValueError, match="needs a reason"):
         Answer(None)
     assert Answer(SE3.identity()).claimed
 
