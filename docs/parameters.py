@@ -3,7 +3,8 @@
 from pathlib import Path
 from typing import Literal, get_args, get_origin
 
-from airground.config import Config, Section, paper
+from airground.config import Section, paper
+from evaluation.setup.settings import Settings
 
 PAGE = Path(__file__).with_suffix(".md")
 INTRODUCTION = """\
@@ -25,10 +26,10 @@ table for each section below. What it leaves out stays as the preset has it. `--
 
 def page() -> str:
     """The whole page."""
-    best, published = Config(), paper()
+    best, published = Settings(), Settings(**dict(paper()))
     sections = [
         _section(name, getattr(best, name), getattr(published, name))
-        for name in Config.model_fields
+        for name in Settings.model_fields
         if isinstance(getattr(best, name), Section)
     ]
     return "\n".join([INTRODUCTION, *sections])

@@ -1,4 +1,4 @@
-"""The command `airground`: picks the verb, reads its words, runs it.
+"""The command `airground`: picks the verb, reads its options, runs it.
 
 A verb is a dataclass in `evaluation.commands`: its docstring is the help, its fields are
 the options, `main()` is what it does. Only the verb that was asked for is imported, and
@@ -19,25 +19,53 @@ from evaluation.setup import console, progress
 from evaluation.setup.environment import prepare
 
 if TYPE_CHECKING:
-    from evaluation.commands.words import Verb
+    from evaluation.commands.options import Verb
 
-VERBS = {
-    "simulate": "Record what the robots' sensors see in a scene, or in many.",
-    "run": "Run the pipeline over a recording and measure it against the truth.",
-    "evaluate": "Put the results of one or more runs into one report.",
-    "compare": "Draw two to four runs on one page: what changed, and by how much.",
-    "reproduce": "Do all of it: the paper's protocol, from scenes to report.",
-    "sweep": "Turn dials, and measure what that does: curves with intervals.",
-    "check": "Hold results against accepted ones: better, worse, or no difference seen.",
-    "accept": "Accept results: later changes are held against them.",
-    "view": "Look into a run with rerun: in a window, in a browser, or as a file to send.",
-    "gallery": "Draw the pictures of a run as PNG files: maps, depth, costs, particles, errors.",
-    "inspect": "Say what is in a dataset, and what is wrong with it.",
-    "export": "Write a recording, with its truth, in a format that other tools read.",
-    "bench": "Time the pipeline's stages on this machine (Table I).",
-    "doctor": "Look whether this machine can render and compute, and say what is missing.",
+JOBS: dict[str, dict[str, tuple[str, str]]] = {
+    "data": {
+        "simulate": ("data", "Record what the robots' sensors see in a scene, or in many."),
+        "inspect": ("data", "Say what is in a dataset, and what is wrong with it."),
+        "export": ("data", "Write a recording, with its truth, in a format that other tools read."),
+    },
+    "one recording": {
+        "run": ("run", "Run the pipeline over a recording and measure it against the truth."),
+        "track": ("track", "Track one robot alone, with one front end or several."),
+        "live": (
+            "live",
+            "Play a recording at its own rate through the pipeline, as live robots would send it.",
+        ),
+        "view": ("look", "Look into a run with rerun: in a window, a browser, or as a file."),
+        "gallery": (
+            "look",
+            "Draw the pictures of a run as PNG files: maps, depth, costs, particles, errors.",
+        ),
+    },
+    "many recordings": {
+        "reproduce": ("reproduce", "Do all of it: the paper's protocol, from scenes to report."),
+        "sweep": ("sweep", "Turn dials, and measure what that does: curves with intervals."),
+    },
+    "results": {
+        "evaluate": ("results", "Put the results of one or more runs into one report."),
+        "compare": (
+            "results",
+            "Draw two to four runs on one page: what changed, and by how much.",
+        ),
+        "check": (
+            "results",
+            "Hold results against accepted ones: better, worse, or no difference seen.",
+        ),
+        "accept": ("results", "Accept results: later changes are held against them."),
+    },
+    "this machine": {
+        "bench": ("machine", "Time the pipeline's stages on this machine (Table I)."),
+        "doctor": (
+            "machine",
+            "Look whether this machine can render and compute, and say what is missing.",
+        ),
+    },
 }
-"""Each verb `x` is the class `X` in `evaluation.commands.x`."""
+"""Verbs by job, each with its module in `evaluation.commands` and the first line of its help."""
+VERBS = {name: verb for verbs in JOBS.values() for name, verb in verbs.items()}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -58,6 +86,11 @@ def answer(words: list[str]) -> int | None:
     if name not in VERBS:
         console.print_error(f"unknown verb {name!r}; known: {', '.join(VERBS)}")
         return console.EXIT_ERROR
+    if "-h" in rest or "--help" in rest:
+        from evaluation.commands.help import help_text
+
+        print(help_text(name, verb_class(name)))
+        return console.EXIT_OK
     return carry_out(parse(name, rest))
 
 
@@ -70,20 +103,24 @@ def carry_out(verb: Verb) -> int | None:
 
 
 def overview() -> str:
-    """What `airground --help` says."""
+    """What `airground --help` prints."""
     width = max(map(len, VERBS))
-    verbs = "\n".join(f"  {name:<{width}}  {line}" for name, line in VERBS.items())
-    return (
-        "usage: airground VERB [WORDS]\n\n"
-        "Locate a drone in a ground robot's map by 3D structure alone, in simulation.\n\n"
-        f"verbs:\n{verbs}\n\n"
-        "airground VERB --help says what words a verb takes."
-    )
+    lines = [
+        "usage: airground VERB [OPTIONS]",
+        "",
+        "Locate a drone in a ground robot's map by 3D structure alone, in simulation.",
+    ]
+    for job, verbs in JOBS.items():
+        lines += ["", f"{job}:"]
+        lines += [f"  {name:<{width}}  {line}" for name, (_, line) in verbs.items()]
+    return "\n".join([*lines, "", "airground VERB --help lists the options of a verb."])
 
 
 def verb_class(name: str) -> type[Verb]:
     """The dataclass of a verb."""
-    return getattr(importlib.import_module(f"evaluation.commands.{name}"), name.capitalize())
+    module = importlib.import_module(f"evaluation.commands.{VERBS[name][0]}")
+    verb: type[Verb] = getattr(module, name.capitalize())
+    return verb
 
 
 def parse(name: str, words: Sequence[str]) -> Verb:
@@ -98,7 +135,7 @@ def parse(name: str, words: Sequence[str]) -> Verb:
                 verb_class(name),
                 prog=program,
                 args=list(words),
-                config=(tyro.conf.FlagCreatePairsOff,),
+                config=(tyro.conf.FlagCreatePairsOff, tyro.conf.PositionalMetavarFromFieldName),
             )
     except SystemExit as exit_:
         if exit_.code not in (None, 0):

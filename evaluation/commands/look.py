@@ -1,81 +1,126 @@
-"""`airground run --rerun`: what of a run can be looked into afterwards, or while it runs."""
+"""`airground view` and `gallery`: what a run has kept, in rerun or as pictures."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated
 
-from airground.errors import InputError
+from tyro.conf import Positional, create_mutex_group
+
+from airground.errors import AirgroundError, InputError
+from evaluation.commands.options import OutOption, Shown, Verb
+
+IN_PLACE_OF_A_WINDOW = create_mutex_group(required=False)
 
 if TYPE_CHECKING:
-    from airground.core.cloud import Source
-    from airground.core.messages import RobotCalibration
-    from evaluation.run.onlooker import Onlooker
-    from sim.recording.truth import Truth
+    from evaluation.measure.showcase.showcase import Showcase
 
 
 @dataclass(frozen=True, kw_only=True)
-class LookWords:
-    """What is drawn of a run."""
+class View(Verb):
+    """Look into a run with rerun: in a window, a browser, or as a file.
 
-    rerun: bool = False
-    """Leave run.rrd, for `airground view`, and the pictures that gallery draws."""
-    rerun_live: bool = False
-    """As --rerun, and show it as it happens: in a window, or in a browser without a screen."""
-    rerun_level: Literal["summary", "stages", "all"] = "stages"
-    """How much run.rrd keeps of each second: docs/look_into_a_run.md has the sizes."""
+    Everything listens on this machine only; over SSH, forward the ports that --serve names.
+    """
 
-    def check_look_words(self, alone: bool, realtime: bool) -> None:
-        """Raises InputError where a word has no meaning."""
-        if self.rerun_level != "stages" and not self.looks:
-            raise InputError("--rerun-level: only with --rerun or --rerun-live")
-        if self.looks and alone:
-            raise InputError("--rerun: shows both robots; leave --only out")
-        if self.looks and realtime:
+    run: Annotated[Positional[Path], Shown("RUN")]
+    """folder that run --rerun has written, or its run.rrd"""
+    serve: Annotated[bool, IN_PLACE_OF_A_WINDOW] = False
+    """serve the viewer for a browser, until Ctrl-C"""
+    save: Annotated[Path | None, IN_PLACE_OF_A_WINDOW, Shown("FILE")] = None
+    """write one .rrd file that any viewer of rerun opens"""
+
+    def main(self) -> None:
+        from evaluation.show.rerun_view import viewer
+
+        file = rerun_file(self.run)
+        viewer.verify(file)
+        if self.save is not None:
+            viewer.save(file, self.save)
+        elif self.serve:
+            self._serve(file)
+        elif not viewer.has_screen():
             raise InputError(
-                "--rerun: drawing would slow a live run down; run it again without --realtime, "
-                "with --drops DIR/dropped.json, which gives the same result"
+                "no screen here: --serve shows it in a browser, --save FILE takes it elsewhere"
             )
+        else:
+            _check_end(viewer.show(file))
 
-    @property
-    def looks(self) -> bool:
-        """Whether anything is drawn."""
-        return self.rerun or self.rerun_live
+    def _serve(self, file: Path) -> None:
+        from evaluation.show.rerun_view import viewer
 
-    @contextmanager
-    def watching(
-        self,
-        folder: Path,
-        name: str,
-        calibrations: Mapping[Source, RobotCalibration],
-        truth: Truth | None,
-    ) -> Iterator[list[Onlooker]]:
-        """Who draws the run into a folder, while the block runs; nobody where not asked for."""
-        if not self.looks:
-            yield []
-            return
-        from evaluation.show.rerun_view.run_view import RUN_FILE, RunView
-
-        with ExitStack() as stack:
-            viewer = stack.enter_context(_viewer()) if self.rerun_live else None
-            view = RunView(folder / RUN_FILE, name, calibrations, truth, self.rerun_level, viewer)
-            stack.callback(view.close)
-            yield [view]
+        ports = viewer.free_ports()
+        with viewer.serving(ports, file) as server:
+            print(f"in a browser: {ports.page}")
+            forwards = " ".join(f"-L {port}:localhost:{port}" for port in (ports.web, ports.data))
+            print(f"over SSH, first: ssh {forwards} HOST", flush=True)
+            _check_end(server.wait())
 
 
-@contextmanager
-def _viewer() -> Iterator[str]:
-    """A viewer that waits for data; gives its address."""
-    from evaluation.show.rerun_view import viewer
+def _check_end(code: int) -> None:
+    if code:
+        raise AirgroundError(f"the viewer ended with exit code {code}")
 
-    ports = viewer.free_ports()
-    if viewer.has_screen():
-        with viewer.window(ports):
-            yield ports.sink
-        return
-    with viewer.serving(ports):
-        print(f"live in a browser: {ports.page}")
-        yield ports.sink
+
+def rerun_file(run: Path) -> Path:
+    """The .rrd file of a run.
+
+    Raises:
+        InputError: There is none.
+    """
+    from evaluation.show.rerun_view.run_view import RUN_FILE
+
+    if run.is_file():
+        return run
+    if not run.is_dir():
+        raise InputError(f"{run}: no such folder; expected what run --rerun wrote")
+    if not (run / RUN_FILE).is_file():
+        raise InputError(
+            f"{run}: has no {RUN_FILE}; run the recording again with --rerun to look into it"
+        )
+    return run / RUN_FILE
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gallery(OutOption, Verb):
+    """Draw the pictures of a run as PNG files: maps, depth, costs, particles, errors.
+
+    They are those of the report, drawn from what run --rerun or reproduce has kept.
+    """
+
+    run: Annotated[Positional[Path], Shown("RUN")]
+    """folder that run --rerun or reproduce has written"""
+    animation: bool = False
+    """also draw how the first aerial surface finds its place, as an animated WebP"""
+
+    def main(self) -> None:
+        from evaluation.judge.results import TABLE, read_results
+        from evaluation.setup.output import fresh_folder
+        from evaluation.setup.progress import step
+        from evaluation.show.figures.style import save_picture
+        from evaluation.show.report.figures import report_figures
+
+        if self.run.is_dir() and not (self.run / TABLE).exists():
+            raise InputError(
+                f"{self.run}: has no {TABLE}, so nothing in it was held against a truth; "
+                "airground view shows what run --rerun has kept"
+            )
+        results = read_results(self.run)
+        if results.showcase is None:
+            raise InputError(f"{self.run}: keeps no pictures; run the recording again with --rerun")
+        with fresh_folder(self.out) as folder, step("drawing"):
+            table = results.table
+            for drawn in report_figures(table, table.conditions(), results.showcase):
+                save_picture(drawn.figure, folder, drawn.name)
+                print(f"{drawn.name}.png: {drawn.title}")
+            if self.animation:
+                self._animate(folder, results.showcase)
+
+    def _animate(self, folder: Path, showcase: Showcase) -> None:
+        from evaluation.show.figures.landing import save_landing
+
+        if showcase.T_ground_mav is None:
+            raise InputError(f"{self.run}: --animation: its surface was not aligned")
+        save_landing(folder / "landing.webp", showcase, showcase.T_ground_mav)
+        print("landing.webp: the first aerial surface finds its place")

@@ -1,115 +1,280 @@
-"""`airground run`: one recording through the pipeline."""
+"""`airground run`: both robots through the whole pipeline, measured."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from tyro.conf import Positional, arg
+from tyro.conf import Positional
 
 from airground.errors import InputError
-from evaluation.commands.alone import AloneWords
-from evaluation.commands.look import LookWords
-from evaluation.commands.own import OwnWords
-from evaluation.commands.realtime import RealtimeWords
-from evaluation.commands.words import OutWord, SeedWord, SetupWords, Verb
+from evaluation.commands.estimates import RUN_S_PER_S, START_S, recorded
+from evaluation.commands.options import (
+    OutOption,
+    PipelineOptions,
+    SeedOption,
+    Shown,
+    Verb,
+)
 
 if TYPE_CHECKING:
+    from airground.core.cloud import Source
+    from airground.core.messages import RobotCalibration
     from airground.io.recording import Recording
+    from evaluation.judge.summary import Summary
+    from evaluation.measure.showcase.showcase import Showcase
     from evaluation.run.drops import DropList
     from evaluation.run.onlooker import Onlooker
     from evaluation.run.recording import RunResult
-    from evaluation.setup.setups import Setup
+    from evaluation.setup.settings import RerunLevel
+    from evaluation.setup.setups import Given, Setup
     from sim.recording.truth import Truth
 
 DROPPED = "dropped.json"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run(Verb, OwnWords, AloneWords, RealtimeWords, LookWords, SetupWords, SeedWord, OutWord):
+class OwnRecordings:
+    """Recordings of two robots from anywhere."""
+
+    heading: ClassVar[str] = "your own recordings, in place of RECORDING"
+
+    mav: Annotated[Path | None, Shown("DIR")] = None
+    """the MAV's EuRoC folder"""
+    ground: Annotated[Path | None, Shown("DIR")] = None
+    """the ground robot's TUM RGB-D folder"""
+    mav_calibration: Annotated[Path | None, Shown("FILE", "the folder's own")] = None
+    """camera calibration (EuRoC's sensor.yaml)"""
+    ground_calibration: Annotated[Path | None, Shown("FILE", "the folder's own")] = None
+    """camera calibration in the same form"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GivenResults:
+    """Results of other systems in place of a stage."""
+
+    heading: ClassVar[str] = "results of other systems, in place of a stage"
+
+    mav_trajectory: Annotated[Path | None, Shown("FILE")] = None
+    """the MAV's SLAM: TUM file of camera poses, metric with z up"""
+    ground_trajectory: Annotated[Path | None, Shown("FILE")] = None
+    """the ground robot's SLAM: the same"""
+    ground_map: Annotated[Path | None, Shown("FILE")] = None
+    """its map: PLY file in the frame of --ground-trajectory"""
+
+    def given(self) -> Given:
+        """The results, read.
+
+        Raises:
+            InputError: A file cannot be used, or the map has no poses in its frame.
+        """
+        from airground.io.tum import read_tum
+        from evaluation.run.given_map import read_map
+        from evaluation.setup.setups import Given
+
+        if self.ground_map is not None and self.ground_trajectory is None:
+            raise InputError(
+                "--ground-map: needs --ground-trajectory, poses of the ground robot's camera in "
+                "the frame of that map"
+            )
+        return Given(
+            mav=read_tum(self.mav_trajectory) if self.mav_trajectory else None,
+            ground=read_tum(self.ground_trajectory) if self.ground_trajectory else None,
+            ground_map=read_map(self.ground_map) if self.ground_map else None,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class RerunOptions:
+    """What is drawn of a run."""
+
+    heading: ClassVar[str] = "output"
+
+    rerun: bool = False
+    """also write run.rrd for view, and the pictures for gallery"""
+    rerun_live: bool = False
+    """as --rerun, and show the run in a window or a browser"""
+
+    @property
+    def draws(self) -> bool:
+        """Whether anything is drawn."""
+        return self.rerun or self.rerun_live
+
+    @contextmanager
+    def watching(
+        self,
+        folder: Path,
+        name: str,
+        calibrations: Mapping[Source, RobotCalibration],
+        truth: Truth | None,
+        level: RerunLevel = "stages",
+    ) -> Iterator[list[Onlooker]]:
+        """The onlookers that draw a run into a folder; none where it was not asked for."""
+        if not self.draws:
+            yield []
+            return
+        from evaluation.show.rerun_view.run_view import RUN_FILE, RunView
+
+        with ExitStack() as stack:
+            viewer = stack.enter_context(_viewer()) if self.rerun_live else None
+            view = RunView(folder / RUN_FILE, name, calibrations, truth, level, viewer)
+            stack.callback(view.close)
+            yield [view]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption, OutOption, Verb):
     """Run the pipeline over a recording and measure it against the truth.
 
-    Leaves the augmented map and both robots' paths beside the measurements and the report.
-    With --only it tracks one robot, and leaves its trajectory. With --realtime the recording
-    is played at its own rate, and dropped.json says which frames were too many. With --mav and
-    --ground both robots' recordings are one's own, and what is measured needs no truth. With
-    --rerun it leaves run.rrd, which `airground view` opens.
+    Leaves the augmented map, both robots' trajectories, the measurements and the report. Your own
+    two recordings need no truth; what needs it is left out.
     """
 
-    recording: Annotated[
-        Positional[Path | None],
-        arg(metavar="RECORDING", help_behavior_hint="(or --mav and --ground)"),
-    ] = None
-    """A folder that simulate has written."""
+    sections: ClassVar[tuple[str, ...]] = ("oracle", "rerun")
+
+    recording: Annotated[Positional[Path | None], Shown("RECORDING")] = None
+    """folder that simulate has written"""
+    drops: Annotated[Path | None, Shown("FILE")] = None
+    """leave out the images that a live run dropped (its dropped.json)"""
 
     def main(self) -> None:
-        self.check_alone_words()
-        self.check_realtime_words(self.only)
-        live = self.realtime or self.drops is not None
-        self.check_own_words(self.recording, self.only is not None, live)
-        self.check_look_words(self.only is not None, self.realtime)
-        if self.recording is None:
-            setup, seed = self.with_given(self.setup()), self.checked_seed()
-            self.run_own(self.out, setup, seed, self.watching)
-        elif self.only is not None:
-            self.run_one(self.recording, self.out, self.resolved_config(), self.checked_seed())
-        else:
-            self._run_both(self.recording)
+        own = (self.mav, self.ground, self.mav_calibration, self.ground_calibration)
+        match self.recording, self.mav, self.ground:
+            case Path() as recording, *_ if own == (None,) * 4:
+                self._run_simulated(recording)
+            case None, Path() as mav, Path() as ground:
+                self._run_own(mav, ground)
+            case _:
+                raise InputError(
+                    "give either RECORDING, or both --mav DIR and --ground DIR (with which alone "
+                    "--mav-calibration and --ground-calibration go)"
+                )
 
-    def _run_both(self, path: Path) -> None:
+    def _run_simulated(self, path: Path) -> None:
         from airground.core.cloud import Source
-        from airground.io.layout import HEADER
-        from airground.io.recording import Recording
-        from evaluation.judge.results import Results
         from evaluation.measure.close_up import CloseUp
-        from evaluation.run.recording import write_run
+        from evaluation.run.drops import DropList, nothing_dropped
+        from evaluation.run.recording import run_recording
         from evaluation.setup.output import fresh_folder
-        from evaluation.show.report.page import write_results
+        from evaluation.setup.progress import announce
         from evaluation.show.report.screen import print_summary
-        from sim.recording.truth import Truth
 
-        if path.is_dir() and not (path / HEADER).exists():
-            raise InputError(
-                f"{path}: has no {HEADER}; both robots run from a recording that simulate has "
-                "written, or from --mav and --ground, one alone from EuRoC or TUM RGB-D with --only"
-            )
-        setup = self.with_given(replace(self.setup(), variant=self.variant()))
-        seed = self.checked_seed()
+        setup = self._setup_with("" if self.drops is None else "with frames left out")
+        level, seed = self.settings().rerun.level, self.checked_seed()
         with fresh_folder(self.out) as folder:
-            recording = Recording.open(path)
-            truth = Truth.open(recording.path)
-            closeup = CloseUp(recording, truth, setup) if self.looks else None
+            recording, truth = simulated(path)
+            drops = nothing_dropped(recording)
+            if self.drops is not None:
+                drops = DropList.read(self.drops, recording)
+            seconds = recording.duration_s
+            announce(f"runs {recorded(path, seconds)}", START_S + seconds * RUN_S_PER_S)
+            close_up = CloseUp(recording, truth, setup) if self.draws else None
             calibrations = {robot: recording.of(robot).calibration for robot in Source}
-            with self.watching(folder, recording.path.name, calibrations, truth) as onlookers:
-                if closeup is not None:
-                    onlookers.append(closeup)
-                result, drops = self._result(recording, truth, setup, seed, onlookers)
-            write_run(folder, recording, result)
-            drops.write(folder / DROPPED)
+            name = recording.path.name
+            with self.watching(folder, name, calibrations, truth, level) as onlookers:
+                if close_up is not None:
+                    onlookers.append(close_up)
+                result = run_recording(recording, truth, setup, seed, drops, onlookers, apart=True)
             showcase = (
-                None if closeup is None else closeup.showcase(result.tracked, result.augmented)
+                None if close_up is None else close_up.showcase(result.tracked, result.augmented)
             )
-            summary = write_results(Results(result.table, setup.config, seed, showcase), folder)
+            summary = write_measured(folder, recording, result, drops, setup, seed, showcase)
         print_summary(summary)
 
-    def _result(
-        self,
-        recording: Recording,
-        truth: Truth,
-        setup: Setup,
-        seed: int,
-        onlookers: Sequence[Onlooker],
-    ) -> tuple[RunResult, DropList]:
-        """What the run leaves, and which frames it did without."""
-        from evaluation.run.drops import DropList, nothing_dropped
-        from evaluation.run.live.live_run import run_live
-        from evaluation.run.recording import run_recording
+    def _run_own(self, mav: Path, ground: Path) -> None:
+        from airground.core.cloud import Source
+        from airground.io.open_recording import open_robot
+        from airground.io.robot_recording import Pair
+        from evaluation.run.own_recordings import print_pair, run_pair, write_pair
+        from evaluation.setup.output import fresh_folder
+        from evaluation.setup.progress import announce
+        from evaluation.setup.settings import write_config
 
-        if self.realtime:
-            return run_live(recording, truth, setup, seed, self.playback())
-        drops = nothing_dropped(recording)
-        if self.drops is not None:
-            drops = DropList.read(self.drops, recording)
-        return run_recording(recording, truth, setup, seed, drops, onlookers, apart=True), drops
+        for word, needs in (("--drops", self.drops), ("--poses oracle", self.poses == "oracle")):
+            if needs:
+                raise InputError(f"{word}: needs a recording that simulate has written")
+        setup = self._setup_with("")
+        level, seed = self.settings().rerun.level, self.checked_seed()
+        with fresh_folder(self.out) as folder:
+            pair = Pair(
+                open_robot(mav, Source.MAV, self.mav_calibration),
+                open_robot(ground, Source.GROUND, self.ground_calibration),
+            )
+            seconds = max(pair.mav.duration_s, pair.ground.duration_s)
+            name = f"{mav.name}, {ground.name}"
+            announce(f"runs {recorded(name, seconds)}", START_S + seconds * RUN_S_PER_S)
+            calibrations = {robot: pair.of(robot).calibration for robot in Source}
+            with self.watching(folder, name, calibrations, None, level) as onlookers:
+                result = run_pair(pair, setup, seed, onlookers)
+            summary = write_pair(folder, pair, setup, result)
+            write_config(setup.config, folder / "config.toml")
+        print_pair(summary)
+
+    def _setup_with(self, variant: str) -> Setup:
+        """The setup with the given results, which its variant names."""
+        from evaluation.setup.setups import NOTHING
+
+        setup, given = self.setup(), self.given()
+        replaced = given.describe()
+        if replaced and setup.poses != "slam":
+            raise InputError("--poses oracle: without files that replace a stage")
+        words = ", ".join(filter(None, (variant, replaced)))
+        return replace(setup, given=given if replaced else NOTHING, variant=words)
+
+
+def simulated(path: Path) -> tuple[Recording, Truth]:
+    """A recording that simulate has written, with its truth.
+
+    Raises:
+        AirgroundError: It is none; names the verb that takes it where there is one.
+    """
+    from airground.io.layout import HEADER
+    from airground.io.recording import Recording
+    from sim.recording.truth import Truth
+
+    if path.is_dir() and not (path / HEADER).exists():
+        raise InputError(
+            f"{path}: has no {HEADER}; expected a recording that simulate has written "
+            "(EuRoC and TUM RGB-D: track takes one robot's, run --mav DIR --ground DIR two)"
+        )
+    recording = Recording.open(path)
+    return recording, Truth.open(recording.path)
+
+
+def write_measured(
+    folder: Path,
+    recording: Recording,
+    result: RunResult,
+    drops: DropList,
+    setup: Setup,
+    seed: int,
+    showcase: Showcase | None = None,
+) -> Summary:
+    """Write what a run of both robots leaves; returns its summary."""
+    from evaluation.judge.results import Results
+    from evaluation.run.recording import write_run
+    from evaluation.setup.progress import step
+    from evaluation.show.report.page import write_results
+
+    with step("writing the report"):
+        write_run(folder, recording, result)
+        drops.write(folder / DROPPED)
+        return write_results(Results(result.table, setup.config, seed, showcase), folder)
+
+
+@contextmanager
+def _viewer() -> Iterator[str]:
+    """A viewer that waits for data; gives its address."""
+    from evaluation.show.rerun_view import viewer
+
+    ports = viewer.free_ports()
+    if viewer.has_screen():
+        with viewer.window(ports):
+            yield ports.sink
+        return
+    with viewer.serving(ports):
+        print(f"live in a browser: {ports.page}")
+        yield ports.sink

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from tyro.conf import UseAppendAction, arg
+from tyro.conf import UseAppendAction
 
-from evaluation.commands.words import (
-    ClusterWord,
-    ResumableOutWord,
-    SeedWord,
-    SensorWord,
-    SetupWords,
+from airground.errors import InputError
+from evaluation.commands.estimates import MEASURE_S_PER_S, RENDER_S_PER_S, work_s
+from evaluation.commands.options import (
+    ClusterOption,
+    PipelineOptions,
+    ResumableOutOption,
+    SeedOption,
+    SensorOption,
+    Shown,
     Verb,
     in_range,
 )
@@ -21,43 +24,47 @@ if TYPE_CHECKING:
     from evaluation.measure.plans.sweep import SweepPlan
 
 
+SEQUENCES, TRIALS = 7, 12
+"""Of each flight, unless section protocol says otherwise."""
+
+
 @dataclass(frozen=True, kw_only=True)
-class Sweep(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, ClusterWord):
+class Sweep(SensorOption, SeedOption, PipelineOptions, ResumableOutOption, ClusterOption, Verb):
     """Turn dials, and measure what that does: curves with intervals.
 
     Flies the same flights at every combination of the values, and writes results.parquet with
-    a column for each dial, sweep.json and figures. docs/sweep.md lists the dials.
+    a column for each dial, sweep.json and figures. docs/sweep.md lists the dials. Section protocol
+    of the configuration says how much is measured on each flight (docs/parameters.md).
     """
 
-    vary: Annotated[
-        UseAppendAction[tuple[str, ...]],
-        arg(metavar="NAME=VALUE,VALUE,...", help_behavior_hint="(repeatable)"),
-    ] = ()
-    """A dial and its values: scene.overlap=0.4,0.6,0.8 or any parameter of the pipeline."""
-    scenes: Annotated[tuple[str, ...], arg(metavar="SCENE ...")] = ("tiny",)
-    """Scenes to fly over."""
-    flights: Annotated[int, arg(metavar="N")] = 4
-    """Flights over each scene, every one over a heap of its own."""
-    sequences: Annotated[int, arg(metavar="N")] = 7
-    """Sequences of 12 aerial maps a flight."""
-    trials: Annotated[int, arg(metavar="N")] = 12
-    """Refinements from a noisy start a flight."""
-    duration_s: Annotated[
-        float | None, arg(metavar="S", help_behavior_hint="(default: the scene's)")
-    ] = None
-    """Cut flights short."""
+    sections: ClassVar[tuple[str, ...]] = ("oracle", "protocol")
+
+    vary: Annotated[UseAppendAction[tuple[str, ...]], Shown("NAME=VALUE,VALUE,...")] = ()
+    """dial (docs/sweep.md) or parameter, with values; repeatable"""
+    scenes: Annotated[tuple[str, ...], Shown("SCENE ...")] = ("tiny",)
+    """scenes to fly over"""
+    flights: Annotated[int, Shown("N")] = 4
+    """flights over each scene, every one over a heap of its own"""
+    duration_s: Annotated[float | None, Shown("S", "the scene's")] = None
+    """length of each flight [s]"""
 
     def main(self) -> None:
         from evaluation.judge.sweep import sweep
         from evaluation.measure.work.crew import Crew
         from evaluation.measure.work.out_folder import resumable_folder
+        from evaluation.setup.progress import announce
         from evaluation.show.sweep_results import print_sweep, write_sweep
 
         plan = self.plan()
+        recorded_s = sum(self.duration_s or scene.duration_s for scene in plan.scenes)
+        passes = plan.tasks()
+        core_s = recorded_s / len(plan.scenes) * passes * (RENDER_S_PER_S + MEASURE_S_PER_S)
+        what = f"measures {len(plan.points())} points, {passes} passes over flights"
         with (
             resumable_folder(self.out) as folder,
             Crew(self.cluster, self.workers(), plan.tasks(), folder.scratch) as crew,
         ):
+            announce(what, work_s(core_s, self.workers()))
             measured = sweep(plan, folder.store, crew)
             write_sweep(folder.results, plan, measured)
         print_sweep(plan, measured)
@@ -69,19 +76,18 @@ class Sweep(Verb, SetupWords, SensorWord, SeedWord, ResumableOutWord, ClusterWor
         from sim.scene import load_scene
         from sim.sensors.presets import sensor_preset
 
-        counts = {
-            name: int(in_range(f"--{name}", getattr(self, name), low=1))
-            for name in ("flights", "sequences", "trials")
-        }
+        asked = self.settings().protocol
+        if asked.baselines is not None:
+            raise InputError("protocol.baselines: a sweep tries no baselines")
         if self.duration_s is not None:
             in_range("--duration-s", self.duration_s, low=1, high=600)
         plan = SweepPlan(
             varied=parse_vary(self.vary),
             scenes=tuple(load_scene(scene) for scene in self.scenes),
-            flights=counts["flights"],
+            flights=int(in_range("--flights", self.flights, low=1)),
             setup=self.setup(),
             sensors=sensor_preset(self.sensors),
-            protocol=Protocol(counts["sequences"], counts["trials"]),
+            protocol=Protocol(asked.sequences_per_flight or SEQUENCES, asked.trials or TRIALS),
             seed=self.checked_seed(),
             duration_s=self.duration_s,
         )

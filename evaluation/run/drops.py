@@ -63,7 +63,7 @@ class DropList(_Part):
         if made.recording != fingerprint(recording):
             raise InputError(
                 f"{path}: was made with another recording than {recording.path}; "
-                "give the one that run --realtime played"
+                "give the one that live played"
             )
         return made
 

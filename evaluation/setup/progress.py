@@ -34,7 +34,6 @@ class Step:
         total: Extent of the work in `unit`; None if unknown.
         unit: Unit of `total`, in the plural: "units", "s recorded".
         done: Extent that is done already.
-        expected_s: Duration to be expected [s]; it gives the time left until there is a rate.
     """
 
     def __init__(
@@ -43,12 +42,10 @@ class Step:
         total: float | None = None,
         unit: str = "",
         done: float = 0.0,
-        expected_s: float | None = None,
     ) -> None:
         self.what, self.total, self.unit, self.done = what, total, unit, done
         self.note = ""
-        self._before = done
-        self._expected_s = expected_s
+        self._before, self._in_part = done, 0
         self._started = time.monotonic()
 
     def advance(self, amount: float = 1.0) -> None:
@@ -67,8 +64,13 @@ class Step:
             self.advance()
 
     def say(self, note: str) -> None:
-        """Name the part of the work that begins now."""
+        """Name what is done now."""
         self.note = note
+
+    def next(self, note: str) -> None:
+        """Name the part that begins now; the one before it, if it was named so, is done."""
+        self.done += self._in_part
+        self._in_part, self.note = 1, note
 
     @property
     def elapsed_s(self) -> float:
@@ -77,13 +79,12 @@ class Step:
 
     @property
     def left_s(self) -> float | None:
-        """Estimate of the time left [s]; None if nothing is known."""
+        """Estimate of the time left [s], the command's until there is a rate; None if unknown."""
         gained = self.done - self._before
         if self.total is not None and gained > 0:
             return max(0.0, self.elapsed_s / gained * (self.total - self.done))
-        if self._expected_s is not None and self._expected_s > self.elapsed_s:
-            return self._expected_s - self.elapsed_s
-        return None
+        left_s = 0.0 if _due is None else _due - time.monotonic()
+        return left_s if left_s > 0 else None
 
     def extent(self) -> str:
         """What is done of how much: "3/8 units"."""
@@ -102,6 +103,7 @@ class Step:
 
 _open_steps: list[Step] = []
 _display: _Plain | _Bars | None = None
+_due: float | None = None  # when the command ought to be done, by time.monotonic
 
 
 @contextmanager
@@ -110,10 +112,9 @@ def step(
     total: float | None = None,
     unit: str = "",
     done: float = 0.0,
-    expected_s: float | None = None,
 ) -> Iterator[Step]:
     """A step that is shown, inside `shown`, until the block ends; arguments as of `Step`."""
-    opened = Step(what, total, unit, done, expected_s)
+    opened = Step(what, total, unit, done)
     _open_steps.append(opened)
     if _display is not None:
         _display.begin(opened)
@@ -132,20 +133,22 @@ def announce(what: str, expected_s: float | None = None) -> None:
         what: Work to be done, with its extent.
         expected_s: Duration to be expected [s]; None if it cannot be known.
     """
+    global _due
     if _display is not None:
+        _due = None if expected_s is None else time.monotonic() + expected_s
         _display.write(what if expected_s is None else f"{what}; takes {roughly(expected_s)}")
 
 
 @contextmanager
 def shown() -> Iterator[None]:
     """Show every step that is open during the block."""
-    global _display
+    global _display, _due
     _display = _Bars(stderr()) if stderr().is_terminal else _Plain()
     try:
         yield
     finally:
         _display.close()
-        _display = None
+        _display = _due = None
 
 
 @cache

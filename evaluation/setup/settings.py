@@ -3,17 +3,80 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, TypeVar
 
 import tomli_w
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
-from airground.config import PRESETS, Config
+from airground.config import PRESETS, Config, Section
 from airground.errors import ConfigError
+from evaluation.setup.setups import PoseNoise
 
 DEFAULT_PRESET = "best"
+
+AnyConfig = TypeVar("AnyConfig", bound=Config)
+
+
+class OracleErrors(Section):
+    """Errors that are added to true poses (`--poses oracle`)."""
+
+    drift_mav_cm: Annotated[float, Field(ge=0, le=100)] = 0.0
+    """RMS of the MAV's slow position error after alignment [cm]; the paper measured 1.2."""
+    drift_ground_cm: Annotated[float, Field(ge=0, le=100)] = 0.0
+    """RMS of the ground robot's drift after alignment [cm]; the paper measured 3.8."""
+    noise_mm: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    """White position noise per axis and frame [mm]."""
+    noise_deg: Annotated[float, Field(ge=0, le=45)] = 0.0
+    """White orientation noise per axis and frame [deg]."""
+
+    def noise(self) -> PoseNoise:
+        """The same in metres and degrees."""
+        return PoseNoise(
+            drift_mav_m=self.drift_mav_cm / 100,
+            drift_ground_m=self.drift_ground_cm / 100,
+            white_m=self.noise_mm / 1000,
+            white_deg=self.noise_deg,
+        )
+
+
+class ProtocolCounts(Section):
+    """Amount measured on each flight, by `reproduce` and `sweep`; None for the verb's default."""
+
+    sequences_per_flight: Annotated[int | None, Field(ge=1)] = None
+    """Sequences of 12 aerial maps per flight, at most."""
+    trials: Annotated[int | None, Field(ge=1)] = None
+    """Refinements from a noisy start per flight."""
+    baselines: Annotated[int | None, Field(ge=0)] = None
+    """Number of these that every baseline is tried on as well; 0 for none."""
+
+
+RerunLevel = Literal["summary", "stages", "all"]
+
+
+class RerunDetail(Section):
+    """Contents of run.rrd, which `run --rerun` writes."""
+
+    level: RerunLevel = "stages"
+    """Detail of each second: docs/look_into_a_run.md has the sizes."""
+
+
+class Settings(Config):
+    """The pipeline's configuration, and the sections that only the evaluator reads."""
+
+    oracle: OracleErrors = OracleErrors()
+    protocol: ProtocolCounts = ProtocolCounts()
+    rerun: RerunDetail = RerunDetail()
+
+    def pipeline(self) -> Config:
+        """What the pipeline reads of it."""
+        return Config.model_validate(self.model_dump(include=set(Config.model_fields)))
+
+
+EVALUATOR_SECTIONS = tuple(
+    name for name in Settings.model_fields if name not in Config.model_fields
+)
 
 
 def resolve(
@@ -22,13 +85,25 @@ def resolve(
     overrides: Sequence[str] = (),
     heading: str | None = None,
 ) -> Config:
-    """The configuration that the command line asks for.
+    """The pipeline's configuration; arguments and errors as of `resolve_all`."""
+    return resolve_all(preset, file, overrides, heading).pipeline()
+
+
+def resolve_all(
+    preset: str | None = None,
+    file: Path | None = None,
+    overrides: Sequence[str] = (),
+    heading: str | None = None,
+    sections: Sequence[str] = (),
+) -> Settings:
+    """All parameters that the command line asks for.
 
     Args:
         preset: A name in `PRESETS`; None for that of `file`, or else "best".
-        file: TOML with any subset of the configuration's sections.
+        file: TOML with any subset of the sections.
         overrides: "section.name=value", the value as in TOML; they win over the file.
         heading: Short for localization.heading; wins over the file, not over `overrides`.
+        sections: Sections of `EVALUATOR_SECTIONS` that have a meaning here.
 
     Raises:
         ConfigError: A name is unknown, a value is out of its range, or the file is no TOML.
@@ -41,18 +116,20 @@ def resolve(
     if name not in PRESETS:
         raise ConfigError(f"unknown preset {name!r}; known: {', '.join(PRESETS)}")
 
-    config = PRESETS[name]()
+    unused = set(EVALUATOR_SECTIONS) - set(sections)
+    settings = Settings(**dict(PRESETS[name]()))
     for section, values in contents.items():
         if not isinstance(values, dict):
-            raise ConfigError(f"{file}: {section!r} is no section; known: {_names(Config)}")
+            known = _names(Settings, unused)
+            raise ConfigError(f"{file}: {section!r} is no section; known: {known}")
         for key, value in values.items():
-            config = with_value(config, section, key, value, str(file))
+            settings = with_value(settings, section, key, value, str(file), unused)
     if heading is not None:
-        config = with_value(config, "localization", "heading", heading, "--heading")
+        settings = with_value(settings, "localization", "heading", heading, "--heading")
     for override in overrides:
         section, key, value = _split(override)
-        config = with_value(config, section, key, value, f"--set {override}")
-    return config
+        settings = with_value(settings, section, key, value, f"--set {override}", unused)
+    return settings
 
 
 def write_config(config: Config, path: Path) -> None:
@@ -85,15 +162,25 @@ def parsed_value(text: str) -> Any:
         return text.strip()
 
 
-def with_value(config: Config, section: str, key: str, value: Any, origin: str) -> Config:
+def with_value(
+    config: AnyConfig,
+    section: str,
+    key: str,
+    value: Any,
+    origin: str,
+    unused: Collection[str] = (),
+) -> AnyConfig:
     """`config` with one value changed and validated.
 
     Raises:
-        ConfigError: There is no such key, or the value is out of its range; names `origin`.
+        ConfigError: There is no such key, or the section is unused, or the value is out of its
+            range; names `origin`.
     """
-    part = getattr(config, section, None) if section in Config.model_fields else None
+    is_section = section in type(config).model_fields and section not in unused
+    part = getattr(config, section) if is_section else None
     if not isinstance(part, BaseModel):
-        raise ConfigError(f"{origin}: unknown section {section!r}; known: {_names(Config)}")
+        known = _names(type(config), unused)
+        raise ConfigError(f"{origin}: unknown section {section!r}; known: {known}")
     if key not in type(part).model_fields:
         known = _names(type(part))
         raise ConfigError(f"{origin}: unknown key {section}.{key}; known: {known}")
@@ -105,5 +192,5 @@ def with_value(config: Config, section: str, key: str, value: Any, origin: str) 
     return config.model_copy(update={section: changed})
 
 
-def _names(model: type[BaseModel]) -> str:
-    return ", ".join(name for name in model.model_fields if name != "preset")
+def _names(model: type[BaseModel], unused: Collection[str] = ()) -> str:
+    return ", ".join(name for name in model.model_fields if name not in {"preset", *unused})

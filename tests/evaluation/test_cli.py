@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import errno
 import os
+import re
 import resource
 import signal
 import subprocess
@@ -14,7 +16,7 @@ import pytest
 
 from airground.errors import InputError, RecordingError
 from evaluation import cli
-from evaluation.commands.words import Verb, in_range
+from evaluation.commands.options import Verb, in_range
 from evaluation.setup import console
 
 RUN_CLI = "from evaluation.cli import main; main()"
@@ -50,9 +52,25 @@ def test_every_verb_explains_itself(verb: str, capsys: pytest.CaptureFixture[str
     assert exit_code(verb, "--help") == 0
     said = capsys.readouterr().out
     first_line = (cli.verb_class(verb).__doc__ or "").splitlines()[0]
-    assert first_line == cli.VERBS[verb]
-    assert first_line.split()[0] in said
-    assert "--verbose" in said
+    assert first_line == cli.VERBS[verb][1]
+    assert first_line in said
+    shown = re.findall(r"^  (?:--([a-z-]+)|[A-Z]+)\b", said, re.MULTILINE)
+    assert len(shown) == len(dataclasses.fields(cli.verb_class(verb)))
+    assert "verbose" in shown
+
+
+@pytest.mark.parametrize("verb", cli.VERBS)
+def test_help_fits_a_screen(
+    verb: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("COLUMNS", raising=False)
+    assert exit_code(verb, "--help") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) <= 40
+    assert max(map(len, lines)) <= 100
+    monkeypatch.setenv("COLUMNS", "70")
+    assert exit_code(verb, "-h") == 0
+    assert max(map(len, capsys.readouterr().out.splitlines())) <= 70
 
 
 @pytest.mark.parametrize("verb", cli.VERBS)
@@ -60,14 +78,15 @@ def test_a_verb_is_parsed_without_heavy_imports(verb: str) -> None:
     heavy = "{'numpy', 'mujoco', 'cv2', 'numba', 'open3d', 'pandas', 'matplotlib', 'pydantic'}"
     script = (
         "import sys; from evaluation import cli\n"
-        f"try: cli.parse({verb!r}, ['--help'])\n"
+        f"cli.answer([{verb!r}, '--help'])\n"
+        f"try: cli.parse({verb!r}, ['--no-such-option'])\n"
         "except SystemExit: pass\n"
         f"print(sorted({heavy} & set(sys.modules)), file=sys.stderr)"
     )
     done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     )
-    assert done.stderr.strip() == "[]"
+    assert done.stderr.splitlines()[-1] == "[]"
 
 
 def test_overview_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
@@ -85,7 +104,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("words", "named"),
     [
-        (["simulat"], "known: simulate, run, evaluate"),
+        (["simulat"], "known: simulate, inspect, export, run"),
         (["simulate", "flat", "--out", "x", "--sensors", "good"], "'nominal'"),
         (["simulate", "flat", "--out", "x", "--seed", "a"], "--seed"),
         (["simulate", "flat", "--out", "x", "--sed", "1"], "--sed"),
@@ -93,6 +112,11 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
         (["doctor", "--threads", "0"], "--threads 0: must be at least 1"),
         (["reproduce", "--out", "x", "--poses", "file"], "'slam'"),
         (["reproduce", "--out", "x", "--render", "--recordings", "y"], "--render"),
+        (["reproduce", "--out", "x", "--quick", "--suite", "fast"], "--suite"),
+        (["run", "a", "--out", "x", "--set", "protocol.trials=2"], "unknown section 'protocol'"),
+        (["run", "--out", "x"], "give either RECORDING, or both --mav DIR and --ground DIR"),
+        (["live", "--out", "x"], "RECORDING"),
+        (["track", "no_such_folder", "--out", "x"], "no_such_folder: no such folder"),
     ],
 )
 def test_wrong_words_get_one_line(

@@ -67,7 +67,8 @@ def with_line(table: str) -> str:
 def test_the_baseline_answers_over_the_scene(copy: Path) -> None:
     command = "from evaluation.cli import main; main()"
     words = "reproduce --scenes small.toml --flights 1 --alone --poses oracle --out heap"
-    counts = "--sequences-per-flight 1 --trials 2 --baselines 2"
+    counts = "--set protocol.sequences_per_flight=1 --set protocol.trials=2"
+    counts += " --set protocol.baselines=2"
     done = subprocess.run(
         [sys.executable, "-c", command, *words.split(), *counts.split()],
         cwd=copy,

@@ -1,12 +1,8 @@
-"""Position errors over time of several front ends on one robot's recording.
-
-python -m evaluation.show.figures.front_ends RECORDING ground slam open3d opencv --out FILE.png
-"""
+"""Position errors over time of several front ends on one robot's recording."""
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,18 +11,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from airground.config import Config
-from airground.core.cloud import Source
-from airground.errors import InputError
-from airground.io.open_recording import open_robot
 from airground.io.robot_recording import RobotRecording
-from airground.slam import front_ends
-from airground.slam.front_end import FrontEnd
-from evaluation.run.own_recordings import run_alone
-from evaluation.show.figures.style import PICTURE_DPI, SERIES, WIDE_IN, styled
-from evaluation.table.tracked_share import tracked_share_of
+from evaluation.run.own_recordings import AloneResult
+from evaluation.show.figures.style import SERIES, WIDE_IN, save_picture, styled
+from evaluation.table.tracked_share import TruePose, tracked_share_of
 from evaluation.table.trajectory_error import aligned_errors
-from evaluation.table.true_camera import true_camera
+
+MIN_POSES = 3
+"""Fewer positions determine no alignment."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,51 +59,31 @@ def front_ends_figure(title: str, errors: Sequence[FrontEndError]) -> Figure:
     return figure
 
 
-def front_end_error(recording: RobotRecording, name: str, config: Config) -> FrontEndError:
-    """Run one front end over a recording with known truth.
-
-    Raises:
-        InputError: The recording has no truth, or the front end gave too few poses.
-    """
-    true_pose = true_camera(recording)
-    if true_pose is None:
-        raise InputError(f"{recording.path}: no ground truth to compare with")
-    given = front_ends.Ingredients(recording.calibration, config, np.random.default_rng(0))
-    front_end: FrontEnd[Any]
-    if recording.robot == Source.MAV:
-        front_end = front_ends.make_front_end(front_ends.MAV, name, given)
-    else:
-        front_end = front_ends.make_front_end(front_ends.GROUND, name, given)
-    result = run_alone(recording, front_end)
-    truth = {
-        stamp: true
-        for stamp, _ in result.log.live_poses()
-        if (true := true_pose(stamp)) is not None
-    }
-    if len(truth) < 3:
-        raise InputError(f"{name}: gave {len(truth)} poses with known truth, at least 3 needed")
-    known = [(stamp, pose) for stamp, pose in result.log.live_poses() if stamp in truth]
+def front_end_error(
+    recording: RobotRecording[Any], name: str, result: AloneResult, true_pose: TruePose
+) -> FrontEndError | None:
+    """Errors of one front end's live poses; None with fewer than `MIN_POSES` of known truth."""
+    poses = result.log.live_poses()
+    truth = {stamp: true for stamp, _ in poses if (true := true_pose(stamp)) is not None}
+    if len(truth) < MIN_POSES:
+        return None
+    known = [(stamp, pose) for stamp, pose in poses if stamp in truth]
     errors = aligned_errors(known, truth.__getitem__)
     time_s = (np.array(list(truth)) - recording.camera_stamps[0]) * 1e-9
     share = tracked_share_of(recording, result.log.answers, true_pose)
     return FrontEndError(name, time_s, errors, share.fraction)
 
 
-def main(words: Sequence[str] | None = None) -> None:
-    """Draw the errors of the given front ends, and print a line for each."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("recording", type=Path)
-    parser.add_argument("robot", choices=["mav", "ground"])
-    parser.add_argument("front_ends", nargs="+", metavar="FRONT_END")
-    parser.add_argument("--out", type=Path, required=True, help="picture to write")
-    given = parser.parse_args(words)
-    recording = open_robot(given.recording, Source[given.robot.upper()])
-    errors = [front_end_error(recording, name, Config()) for name in given.front_ends]
-    title = f"{given.recording.resolve().name}, {given.robot}, live poses"
-    front_ends_figure(title, errors).savefig(given.out, dpi=PICTURE_DPI)
-    for one in errors:
-        print(f"{one.name:10} {one.rms_cm:6.2f} cm RMS after SE3   {one.tracked:6.1%} tracked")
-
-
-if __name__ == "__main__":
-    main()
+def draw_front_ends(
+    folder: Path,
+    recording: RobotRecording[Any],
+    results: Mapping[str, AloneResult],
+    true_pose: TruePose | None,
+) -> None:
+    """Write `front_ends.png` with all front ends whose errors are known, if there are any."""
+    if true_pose is None:
+        return
+    found = [front_end_error(recording, *one, true_pose) for one in results.items()]
+    if errors := [error for error in found if error is not None]:
+        title = f"{recording.path.resolve().name}, {recording.robot.name.lower()}, live poses"
+        save_picture(front_ends_figure(title, errors), folder, "front_ends")

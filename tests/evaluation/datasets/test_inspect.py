@@ -20,6 +20,7 @@ from evaluation.datasets.inspection.inspect_dataset import inspect_dataset
 from evaluation.datasets.inspection.photometric import Posed, fit
 from evaluation.datasets.plan import Plan, World
 from evaluation.datasets.simulated import Simulated
+from evaluation.setup import console
 
 Exported = Callable[[str], Path]
 APART = 8
@@ -65,7 +66,7 @@ def test_the_exit_code_and_the_json_tell_what_is_wrong(
     changed = Path(shutil.copytree(small, tmp_path / "changed"))
     first, second = sorted((changed / "ground" / "rgb").iterdir())[:2]
     shutil.copyfile(first, second)
-    assert airground("inspect", changed, "--json") == 1
+    assert airground("inspect", changed, "--json") == console.EXIT_FAULT_FOUND
     told = json.loads(capsys.readouterr().out)
     assert told["layout"] == "airground"
     (one,) = [finding for finding in told["findings"] if finding["verdict"] == "wrong"]

@@ -156,7 +156,8 @@ def test_trials_are_spread_evenly() -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "count"), [((), 12), (("--quick",), 0), (("--quick", "--baselines", "3"), 3)]
+    ("words", "count"),
+    [((), 12), (("--quick",), 0), (("--quick", "--set", "protocol.baselines=3"), 3)],
 )
 def test_reproduce_says_on_how_many_trials(words: tuple[str, ...], count: int) -> None:
     verb = parse("reproduce", ["--out", "x", *words])
@@ -165,7 +166,7 @@ def test_reproduce_says_on_how_many_trials(words: tuple[str, ...], count: int) -
 
 
 def test_a_negative_number_of_trials_is_refused() -> None:
-    verb = parse("reproduce", ["--out", "x", "--baselines", "-1"])
+    verb = parse("reproduce", ["--out", "x", "--set", "protocol.baselines=-1"])
     assert isinstance(verb, Reproduce)
-    with pytest.raises(InputError, match="--baselines -1"):
+    with pytest.raises(InputError, match=r"protocol\.baselines = -1"):
         verb.plan()

@@ -142,5 +142,6 @@ def test_negatives_are_tried_on_the_primary_setup_of_flights_with_something_to_f
 def test_the_words_say_how_much(tmp_path: Path) -> None:
     plan = Reproduce(out=tmp_path).plan()
     assert (plan.protocol.sequences, plan.sequences) == (6, 0)
-    plan = Reproduce(out=tmp_path, sequences=500, sequences_per_flight=14).plan()
+    more = ("protocol.sequences_per_flight=14",)
+    plan = Reproduce(out=tmp_path, sequences=500, overrides=more).plan()
     assert (plan.protocol.sequences, plan.sequences) == (14, 500)

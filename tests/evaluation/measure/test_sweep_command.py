@@ -15,7 +15,8 @@ from airground.errors import InputError
 from evaluation.commands.sweep import Sweep
 
 WORDS = ["--vary", "localization.particles=50,100", "--scenes", "tiny", "--flights", "2"]
-WORDS += ["--duration-s", "13", "--sequences", "1", "--trials", "2", "--poses", "oracle"]
+WORDS += ["--duration-s", "13", "--poses", "oracle"]
+WORDS += ["--set", "protocol.sequences_per_flight=1", "--set", "protocol.trials=2"]
 
 
 @pytest.mark.parametrize(
@@ -25,6 +26,8 @@ WORDS += ["--duration-s", "13", "--sequences", "1", "--trials", "2", "--poses", 
         ({"vary": ("scene.texture=2",)}, "out of its range"),
         ({"vary": ("scene.texture=1",), "flights": 0}, "--flights 0: must be at least 1"),
         ({"vary": ("scene.texture=1",), "duration_s": 0.0}, "--duration-s 0"),
+        ({"vary": ("scene.texture=1",), "overrides": ("protocol.trials=0",)}, "protocol.trials"),
+        ({"vary": ("scene.texture=1",), "overrides": ("protocol.baselines=1",)}, "no baselines"),
         ({"vary": ("scene.heap_height=1",), "scenes": ("flat",)}, r"no \[rubble\]"),
         ({"vary": ("scene.texture=1",), "scenes": ("nowhere",)}, "unknown scene 'nowhere'"),
     ],

@@ -98,11 +98,11 @@ def assert_same(one: RunResult, two: RunResult) -> None:
 
 
 class Running:
-    """`airground run --realtime` in a process of its own, its images 3 s apart."""
+    """`airground live` in a process of its own, its images 3 s apart."""
 
     def __init__(self, recording: Recording, out: Path) -> None:
-        words = ["run", str(recording.path), "--out", str(out), "--poses", "oracle"]
-        words += ["--realtime", "--split", "--rate", "0.01"]
+        words = ["live", str(recording.path), "--out", str(out), "--poses", "oracle"]
+        words += ["--split", "--rate", "0.01"]
         script = (
             "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
             "from evaluation.cli import main; main()"

@@ -45,7 +45,7 @@ def summary(folder: Path) -> dict[str, Any]:
 
 def test_a_tum_folder_is_tracked_and_measured(tum: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    words = ("run", tum, "--only", "ground", "--front-end", "opencv", "--out", out)
+    words = ("track", tum, "--front-end", "opencv", "--out", out)
     assert airground(*words) == console.EXIT_OK
     made = summary(out)
     assert made["layout"] == "tum"
@@ -65,7 +65,7 @@ def test_an_euroc_folder_is_tracked_and_measured(euroc: Path, tmp_path: Path) ->
     sequence = mav_sequence(FRAMES)
     write_tum(tmp_path / "poses.tum", sequence.T_world_camera)
     out = tmp_path / "out"
-    words = ("run", euroc / "mav0", "--only", "mav", "--front-end", "file")
+    words = ("track", euroc / "mav0", "--front-end", "file")
     assert airground(*words, "--trajectory", tmp_path / "poses.tum", "--out", out) == 0
     made = summary(out)
     assert made["pose_frame"] == "body"
@@ -82,19 +82,44 @@ def test_without_truth_there_is_a_trajectory_but_no_error(tum: Path, tmp_path: P
     folder = tmp_path / "no_truth"
     shutil.copytree(tum, folder, ignore=shutil.ignore_patterns("groundtruth.txt"))
     out = tmp_path / "out"
-    words = ("run", folder, "--only", "ground", "--front-end", "opencv", "--out", out)
+    words = ("track", folder, "--robot", "ground", "--front-end", "opencv", "--out", out)
     assert airground(*words) == 0
     assert summary(out)["error"] == {"final": None, "live": None}
 
 
+def test_front_ends_stand_beside_each_other(
+    tum: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A trajectory asks for the front end that follows it, beside those that are named."""
+    write_tum(tmp_path / "poses.tum", ground_sequence(FRAMES).T_world_camera)
+    out = tmp_path / "out"
+    words = ("track", tum, "--front-end", "opencv", "--trajectory", tmp_path / "poses.tum")
+    assert airground(*words, "--out", out) == console.EXIT_OK
+    assert {path.name for path in out.iterdir()} == {"opencv", "file", "front_ends.png"}
+    assert summary(out / "file")["error"]["live"]["ate_se3_rmse_m"] < 1e-6
+    assert summary(out / "opencv")["tracked_fraction"] == 1.0
+    said = capsys.readouterr().out
+    assert said.index("front end opencv") < said.index("front end file")
+
+
+def test_two_robots_in_one_folder_must_be_told_apart(
+    small: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ("track", small, "--front-end", "opencv", "--out", tmp_path / "out")
+    assert airground(*words) == console.EXIT_ERROR
+    assert "holds both robots; give --robot mav or --robot ground" in capsys.readouterr().err
+    assert airground(*words, "--robot", "ground") == console.EXIT_OK
+
+
 BAD_WORDS = {
-    "both robots": ((), "one alone from EuRoC or TUM RGB-D with --only"),
-    "wrong front end": (("--only", "mav", "--front-end", "opencv"), "known: slam, file"),
-    "front end": (("--only", "ground", "--front-end", "orb"), "known: slam, open3d, opencv, file"),
-    "no file": (("--only", "ground", "--front-end", "file"), "--trajectory FILE go together"),
-    "front end of both": (("--front-end", "opencv"), "only with --only"),
-    "calibration of both": (("--calibration", "x.yaml"), "--calibration: only with --only"),
-    "no such calibration": (("--only", "ground", "--calibration", "x.yaml"), "x.yaml: this file"),
+    "front end of the other robot": (
+        ("--robot", "mav", "--front-end", "opencv"),
+        "known: slam, file",
+    ),
+    "front end": (("--front-end", "orb"), "known: slam, open3d, opencv, file"),
+    "no file": (("--front-end", "file"), "needs the trajectory"),
+    "no such calibration": (("--calibration", "x.yaml"), "x.yaml: this file"),
+    "both robots": (("--mav", "x"), "--mav"),
 }
 
 
@@ -103,11 +128,20 @@ def test_invalid_options_give_a_one_line_error_and_leave_nothing(
     tum: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], what: str
 ) -> None:
     words, message = BAD_WORDS[what]
-    assert airground("run", tum, *words, "--out", tmp_path / "out") == console.EXIT_ERROR
+    assert airground("track", tum, *words, "--out", tmp_path / "out") == console.EXIT_ERROR
     error = capsys.readouterr().err
     assert error.startswith("airground: error: ")
     assert error.count("\n") == 1
     assert message in error
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_plain_folder_of_one_robot_is_named_where_two_are_needed(
+    tum: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for verb in ("run", "live"):
+        assert airground(verb, tum, "--out", tmp_path / "out") == console.EXIT_ERROR
+        assert "EuRoC and TUM RGB-D: track takes one robot's" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
 
 
@@ -124,6 +158,6 @@ def test_a_quaternion_that_is_not_of_unit_length_is_named(
         read_euroc_poses(tmp_path / "data.csv")
     poses = tmp_path / "poses.tum"
     poses.write_text("1.0 0 0 0 0.5 0.5 0.5 0.6\n")
-    words = ("run", tum, "--only", "ground", "--front-end", "file", "--trajectory", poses)
+    words = ("track", tum, "--trajectory", poses)
     assert airground(*words, "--out", tmp_path / "out") == console.EXIT_ERROR
     assert "poses.tum:1: the quaternion (qx qy qz qw) must have length 1" in capsys.readouterr().err

@@ -127,7 +127,9 @@ def test_rerun_without_truth_shows_the_rest_and_changes_no_result(
 ) -> None:
     words = ("run", "--mav", euroc, "--ground", tum, "--heading", "search")
     drawn, plain = tmp_path / "drawn", tmp_path / "plain"
-    assert airground(*words, "--rerun", "--rerun-level", "all", "--out", drawn) == console.EXIT_OK
+    assert (
+        airground(*words, "--rerun", "--set", "rerun.level=all", "--out", drawn) == console.EXIT_OK
+    )
     assert airground(*words, "--out", plain) == console.EXIT_OK
     for name in ("augmented_map.ply", "ground.tum"):
         assert file_digest(drawn / name) == file_digest(plain / name)
@@ -181,9 +183,9 @@ REFUSED: dict[str, tuple[list[str], str]] = {
         "--ground-map: needs --ground-trajectory",
     ),
     "oracle": (["--mav", "EUROC", "--ground", "TUM", "--poses", "oracle"], "--poses oracle: needs"),
-    "live": (["--mav", "EUROC", "--ground", "TUM", "--realtime"], "without --only, --realtime"),
+    "drops": (["--mav", "EUROC", "--ground", "TUM", "--drops", "x.json"], "--drops: needs"),
     "swapped": (["--mav", "EUROC", "--ground", "EUROC"], "has no depth images"),
-    "calibration": (["EUROC", "--mav-calibration", "x.yaml"], "only with --mav, --ground"),
+    "calibration": (["EUROC", "--mav-calibration", "x.yaml"], "alone --mav-calibration"),
 }
 
 

@@ -25,7 +25,7 @@ def test_a_file_gets_a_line_while_one_unit_runs_and_one_at_the_end(
     monkeypatch.setattr(progress, "PLAIN_INTERVAL_S", 0.05)
     with shown():
         announce("measures 3 units", 150.0)
-        with step("measuring", 3, "units", done=1, expected_s=150.0) as measuring:
+        with step("measuring", 3, "units", done=1) as measuring:
             time.sleep(0.12)  # no unit is done in the meantime
             measuring.advance(2)
     first, *between, last = capsys.readouterr().err.splitlines()
@@ -43,7 +43,8 @@ def test_a_short_step_is_not_mentioned(capsys: pytest.CaptureFixture[str]) -> No
 def test_the_time_left_comes_from_the_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 100.0
     monkeypatch.setattr("time.monotonic", lambda: now)
-    running = Step("running", 10, "images", done=4, expected_s=30.0)
+    monkeypatch.setattr(progress, "_due", 130.0)  # as announced
+    running = Step("running", 10, "images", done=4)
     now = 110.0
     assert running.left_s == 20.0
     running.advance()
@@ -52,6 +53,10 @@ def test_the_time_left_comes_from_the_rate(monkeypatch: pytest.MonkeyPatch) -> N
     assert running.line() == "running: the last of them, 5/10 images, elapsed 0:10, left about 0:50"
     running.move_to(5, 20)
     assert running.left_s == 150.0
+    running.next("one part")
+    running.next("another")
+    assert running.done == 6
+    now = 140.0
     unknown = Step("compiling")
     assert unknown.left_s is None
     assert unknown.line() == "compiling: elapsed 0:00"

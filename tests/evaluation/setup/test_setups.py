@@ -10,7 +10,7 @@ from airground.config import Config, MonocularSlam, paper
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.errors import InputError
-from evaluation.commands.words import PoseWords
+from evaluation.commands.options import PipelineOptions
 from evaluation.setup.setups import (
     EXACT,
     PAPER_DRIFT,
@@ -78,7 +78,8 @@ def test_setups_share_maps_where_only_later_stages_differ() -> None:
 
 
 def test_drift_needs_an_oracle() -> None:
-    assert PoseWords().pose_noise() == EXACT
-    assert PoseWords(poses="oracle", drift_mav_cm=1.2).pose_noise().drift_mav_m == 0.012
+    drift = ("oracle.drift_mav_cm=1.2",)
+    assert PipelineOptions().setup().noise == EXACT
+    assert PipelineOptions(poses="oracle", overrides=drift).setup().noise.drift_mav_m == 0.012
     with pytest.raises(InputError, match="give --poses oracle"):
-        PoseWords(drift_mav_cm=1.2).pose_noise()
+        PipelineOptions(overrides=drift).setup()

@@ -14,8 +14,9 @@ from rerun.chunk import RrdReader
 
 from airground.errors import AirgroundError, InputError
 from evaluation import cli
-from evaluation.commands.look import LookWords
-from evaluation.commands.view import rerun_file
+from evaluation.commands.live import Live
+from evaluation.commands.look import rerun_file
+from evaluation.setup import console
 from evaluation.show.rerun_view import viewer
 from evaluation.show.rerun_view.run_view import RunView
 from tests.evaluation.show.scripted_run import (
@@ -146,19 +147,23 @@ def test_a_viewer_that_is_closed_meanwhile_leaves_the_file_whole(tmp_path: Path)
     assert ReadBack(file).values("/events", "TextLog:text")[-1] == ["MAV: lost"]
 
 
-@pytest.mark.parametrize(
-    ("words", "alone", "realtime", "complaint"),
-    [
-        (LookWords(rerun_level="all"), False, False, "only with --rerun"),
-        (LookWords(rerun=True), True, False, "leave --only out"),
-        (LookWords(rerun_live=True), False, True, "--drops"),
-    ],
-)
-def test_words_without_a_meaning_are_refused(
-    words: LookWords, alone: bool, realtime: bool, complaint: str
+@pytest.mark.parametrize("verb", ["track", "live"])
+def test_verbs_that_draw_nothing_have_no_rerun(
+    verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with pytest.raises(InputError, match=complaint):
-        words.check_look_words(alone, realtime)
+    with pytest.raises(SystemExit):
+        cli.main([verb, "recording", "--rerun", "--out", str(tmp_path / "out")])
+    assert "--rerun" in capsys.readouterr().err
+    assert ("--drops DIR/dropped.json --rerun" in (Live.__doc__ or "")) == (verb == "live")
+
+
+def test_only_one_way_to_look(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as exit_:
+        cli.main(["view", str(run), "--serve", "--save", "x.rrd"])
+    assert exit_.value.code == console.EXIT_ERROR
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "--save" in line
+    assert "--serve" in line
 
 
 def stand_in(folder: Path, then: str) -> Path:

@@ -1,0 +1,169 @@
+"""`airground simulate`, `inspect`, `export`: datasets made, checked, and written for others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal
+
+from tyro.conf import Positional, UseAppendAction
+
+from airground.errors import InputError
+from evaluation.commands.estimates import RENDER_S_PER_S, work_s
+from evaluation.commands.options import (
+    OutOption,
+    SeedOption,
+    SensorOption,
+    Shown,
+    Verb,
+    in_range,
+)
+from evaluation.setup.console import EXIT_FAULT_FOUND, EXIT_OK
+
+
+@dataclass(frozen=True, kw_only=True)
+class DatasetOptions:
+    """A dataset of many recordings."""
+
+    heading: ClassVar[str] = "dataset of many recordings"
+
+    seeds: Annotated[str | None, Shown("LIST")] = None
+    """make a dataset with these seeds, as in 0-9 or 1,4,10-12"""
+    split: Annotated[UseAppendAction[tuple[str, ...]], Shown("NAME=SHARE")] = ()
+    """part with this share of the worlds (test=0.2); repeatable"""
+    jobs: Annotated[int, Shown("N")] = 1
+    """recordings made at a time"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
+    """Record what the robots' sensors see in a scene, or in many.
+
+    The recording opens in tools that read EuRoC and TUM RGB-D; the truth is apart in truth/. With
+    --seeds: a dataset of every scene with every seed, and its data sheet; given again after an
+    interruption, it makes what is missing.
+    """
+
+    scenes: Annotated[Positional[tuple[str, ...]], Shown("SCENE ...")]
+    """scenes of the package (an unknown name lists them), or .toml files"""
+    duration_s: Annotated[float | None, Shown("S", "the scene's own")] = None
+    """length of the recording [s]"""
+    flight: Annotated[int, Shown("N")] = 0
+    """flight over the same heap: other waypoints, other noise"""
+
+    def main(self) -> None:
+        if self.duration_s is not None:
+            in_range("--duration-s", self.duration_s, low=1.0)
+        if self.seeds is None:
+            self._record_one()
+        else:
+            self._make_dataset(self.seeds)
+
+    def _record_one(self) -> None:
+        from evaluation.setup.output import check_free
+        from evaluation.setup.progress import announce, step
+        from sim.recording.recorder import record
+        from sim.scene import load_scene
+        from sim.sensors.presets import sensor_preset
+
+        if len(self.scenes) != 1 or self.split or self.jobs != 1:
+            raise InputError("several scenes, --split and --jobs: only with --seeds")
+        scene, seed = load_scene(self.scenes[0]), self.checked_seed()
+        flight = int(in_range("--flight", self.flight))
+        check_free(self.out)
+        seconds = self.duration_s or scene.duration_s
+        announce(
+            f"records {seconds:.0f} s over {scene.name}",
+            work_s(seconds * RENDER_S_PER_S, self.workers()),
+        )
+        with step("rendering", unit="images") as rendering:
+            record(
+                scene,
+                seed,
+                sensor_preset(self.sensors),
+                self.out,
+                self.duration_s,
+                self.workers(),
+                flight=flight,
+                progress=rendering.move_to,
+            )
+
+    def _make_dataset(self, seeds: str) -> None:
+        from evaluation.datasets.collection import make_dataset
+        from evaluation.datasets.plan import parse_seeds, parse_split, plan_dataset
+        from evaluation.setup.progress import announce
+        from sim.scene import load_scene
+
+        if not self.scenes or self.seed or self.flight:
+            raise InputError("--seeds: with at least one SCENE, and without --seed and --flight")
+        plan = plan_dataset(
+            self.scenes,
+            parse_seeds(seeds),
+            parse_split(self.split),
+            self.sensors,
+            self.duration_s,
+        )
+        jobs = int(in_range("--jobs", self.jobs, low=1, high=1000))
+        scenes = {scene: load_scene(scene) for scene in self.scenes}
+        seconds = sum(self.duration_s or scenes[world.scene].duration_s for world in plan.worlds)
+        expected_s = work_s(seconds * RENDER_S_PER_S, self.workers())
+        announce(f"records {len(plan.worlds)} worlds, {seconds:.0f} s in all", expected_s)
+        make_dataset(plan, self.out, jobs, self.workers())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inspect(Verb):
+    """Say what is in a dataset, and what is wrong with it.
+
+    For recordings and datasets of simulate, EuRoC and TUM RGB-D folders: digests, rates, gaps,
+    calibration, and whether the true poses fit the images. Exits with 3 if something is wrong.
+    """
+
+    dataset: Annotated[Positional[Path], Shown("DATASET")]
+    """folder of the dataset"""
+    calibration: Annotated[Path | None, Shown("FILE", "the folder's own")] = None
+    """camera calibration of a plain folder, in the form of EuRoC's sensor.yaml"""
+    json: bool = False
+    """print JSON in place of a table"""
+
+    def main(self) -> int:
+        from evaluation.datasets.inspection.findings import Verdict, as_json, show
+        from evaluation.datasets.inspection.inspect_dataset import inspect_dataset
+        from evaluation.setup.progress import step
+
+        with step("inspecting"):
+            layout, findings = inspect_dataset(self.dataset, self.calibration)
+        if self.json:
+            print(as_json(str(self.dataset), layout, findings))
+        else:
+            show(f"{self.dataset} ({layout})", findings)
+        wrong = any(finding.verdict is Verdict.WRONG for finding in findings)
+        return EXIT_FAULT_FOUND if wrong else EXIT_OK
+
+
+@dataclass(frozen=True, kw_only=True)
+class Export(OutOption, Verb):
+    """Write a recording, with its truth, in a format that other tools read.
+
+    docs/datasets.md says for each format what lies where, in which axes and units.
+    """
+
+    recording: Annotated[Positional[Path], Shown("RECORDING")]
+    """folder that simulate has written"""
+    format: Literal["tum", "euroc", "mcap", "nerfstudio", "colmap"]
+    """tum is of the ground robot, euroc of the MAV, the others of either"""
+    robot: Annotated[
+        Literal["mav", "ground", "both"] | None,
+        Shown("{mav,ground,both}", "what the format holds"),
+    ] = None
+    """robot whose sensors are written"""
+
+    def main(self) -> None:
+        from evaluation.datasets.formats import FORMATS, robots_for
+        from evaluation.datasets.simulated import Simulated
+        from evaluation.setup.output import fresh_folder
+        from evaluation.setup.progress import step
+
+        robots = robots_for(self.format, self.robot)
+        with fresh_folder(self.out) as folder, step(f"writing {self.format}"):
+            FORMATS[self.format].write(folder, Simulated.open(self.recording), robots)

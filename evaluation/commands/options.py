@@ -1,0 +1,181 @@
+"""Options that several verbs share, in groups. Nothing heavy is imported at the top of this file.
+
+A verb is a dataclass; each of its bases is a group of options. An option is a field: its docstring
+is its help, and `Shown` says how the help writes its value.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+
+from tyro.conf import UseAppendAction, arg
+
+from airground.errors import InputError
+from evaluation.setup.environment import usable_cores
+
+if TYPE_CHECKING:
+    from airground.config import Config
+    from evaluation.setup.settings import Settings
+    from evaluation.setup.setups import Setup
+
+
+@dataclass(frozen=True)
+class Shown:
+    """How the help shows an option.
+
+    Attributes:
+        metavar: Form of the value.
+        default: What holds without the option, in words; empty for the field's default.
+    """
+
+    metavar: str
+    default: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Verb(ABC):
+    """A verb of the command line.
+
+    Attributes:
+        heading: Heading in the help of the group that a class's options belong to.
+    """
+
+    heading: ClassVar[str] = "machine"
+
+    threads: Annotated[int | None, Shown("N", "one per core")] = None
+    """threads and processes to use"""
+    verbose: bool = False
+    """log each step, and the traceback of an internal error"""
+
+    def workers(self) -> int:
+        """How many threads or processes to use."""
+        return self.threads or usable_cores()
+
+    @abstractmethod
+    def main(self) -> int | None:
+        """Do it; returns the exit code, None for 0."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutOption:
+    """Where results go."""
+
+    heading: ClassVar[str] = "output"
+
+    out: Annotated[Path, Shown("DIR")]
+    """folder to make; it must not exist"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResumableOutOption:
+    """Where results go that may take long."""
+
+    heading: ClassVar[str] = "output"
+
+    out: Annotated[Path, Shown("DIR")]
+    """folder to make; given again, an interrupted run is continued"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClusterOption:
+    """Which machines do the work."""
+
+    heading: ClassVar[str] = "machine"
+
+    cluster: Annotated[str | None, Shown("ADDRESS|FILE", "this machine")] = None
+    """Dask scheduler or batch jobs (docs/sweep.md)"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeedOption:
+    """Where randomness comes from."""
+
+    heading: ClassVar[str] = "input"
+
+    seed: Annotated[int, Shown("N")] = 0
+    """seed of everything random; the same seed gives the same result"""
+
+    def checked_seed(self) -> int:
+        return int(in_range("--seed", self.seed, low=0, high=2**63 - 1))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorOption:
+    """How good the sensors are."""
+
+    heading: ClassVar[str] = "input"
+
+    sensors: Literal["none", "nominal", "harsh"] = "nominal"
+    """noise of the sensors"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConfigOptions:
+    """Parameters of the pipeline."""
+
+    heading: ClassVar[str] = "pipeline"
+    sections: ClassVar[tuple[str, ...]] = ()
+    """Sections of the configuration that the verb uses beside the pipeline's."""
+
+    preset: Annotated[Literal["paper", "best"] | None, Shown("{paper,best}", "best")] = None
+    """constants as published, or ours"""
+    config: Annotated[Path | None, Shown("FILE")] = None
+    """TOML file with any parameters (docs/parameters.md)"""
+    overrides: Annotated[
+        UseAppendAction[tuple[str, ...]], arg(name="set"), Shown("SECTION.NAME=VALUE")
+    ] = ()
+    """one parameter, as in localization.particles=400; repeatable"""
+
+    def settings(self, heading: str | None = None) -> Settings:
+        """All parameters that the options ask for."""
+        from evaluation.setup.settings import resolve_all
+
+        return resolve_all(self.preset, self.config, self.overrides, heading, self.sections)
+
+    def resolved_config(self) -> Config:
+        return self.settings().pipeline()
+
+
+@dataclass(frozen=True, kw_only=True)
+class PipelineOptions(ConfigOptions):
+    """All that makes a setup: the pipeline's parameters and the source of the poses."""
+
+    heading: ClassVar[str] = "pipeline"
+    sections: ClassVar[tuple[str, ...]] = ("oracle",)
+
+    poses: Literal["slam", "oracle"] = "slam"
+    """own SLAM, or true poses with the errors of section oracle"""
+    north: Annotated[
+        Literal["known", "search"] | None, arg(name="heading"), Shown("{known,search}", "known")
+    ] = None
+    """from the magnetometers, or searched as a third dimension"""
+
+    def setup(self) -> Setup:
+        """The setup.
+
+        Raises:
+            InputError: A parameter is out of its range, or errors are given for poses of SLAM.
+        """
+        from evaluation.setup.setups import EXACT, Setup
+
+        settings = self.settings(self.north)
+        noise = settings.oracle.noise()
+        if self.poses == "slam" and noise != EXACT:
+            raise InputError("section oracle adds errors to true poses; give --poses oracle")
+        return Setup(settings.pipeline(), self.poses, noise)
+
+
+def in_range(word: str, value: float, low: float = 0.0, high: float = math.inf) -> float:
+    """`value`, if it lies within [low, high].
+
+    Raises:
+        InputError: It does not, or is no number.
+    """
+    if not (math.isfinite(value) and low <= value <= high):
+        limits = f"at least {low:g}" if math.isinf(high) else f"from {low:g} to {high:g}"
+        raise InputError(f"{word} {value:g}: must be {limits}")
+    return value

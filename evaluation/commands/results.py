@@ -1,0 +1,143 @@
+"""`airground evaluate`, `compare`, `check`, `accept`: results reported and compared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional
+
+from airground.errors import InputError
+from evaluation.commands.options import OutOption, Shown, Verb
+from evaluation.setup.console import EXIT_OK, EXIT_WORSE
+
+if TYPE_CHECKING:
+    from evaluation.judge.measured import Measured
+
+ACCEPTED = Path(__file__).parents[1] / "accepted.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluate(OutOption, Verb):
+    """Put the results of one or more runs into one report.
+
+    The first run's condition leads; runs under other conditions stand beside it.
+    """
+
+    runs: Annotated[Positional[tuple[Path, ...]], Shown("RUN ...")]
+    """folders that run or reproduce has written"""
+
+    def main(self) -> None:
+        from evaluation.judge.results import merged, read_results
+        from evaluation.setup.output import fresh_folder
+        from evaluation.setup.progress import step
+        from evaluation.show.report.page import write_results
+        from evaluation.show.report.screen import print_summary
+
+        if not self.runs:
+            raise InputError("no RUN given: name at least one folder of run or reproduce")
+        results = merged([read_results(run) for run in self.runs])
+        with fresh_folder(self.out) as folder, step("writing the report"):
+            summary = write_results(results, folder)
+        print_summary(summary)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Compare(OutOption, Verb):
+    """Draw two to four runs on one page: what changed, and by how much.
+
+    The first run is the reference. The verdicts are those of check, which gives an exit code
+    instead of a page.
+    """
+
+    runs: Annotated[Positional[tuple[Path, ...]], Shown("RUN ...")]
+    """folders that run or reproduce has written, the reference first"""
+
+    def main(self) -> None:
+        from evaluation.judge.runs import against, read_runs
+        from evaluation.setup.output import fresh_folder
+        from evaluation.setup.progress import step
+        from evaluation.show.comparison.page import PAGE, write_comparison
+        from evaluation.show.comparison.verdict_table import conclusion
+
+        reference, *others = read_runs(self.runs)
+        helds = [against(reference, run) for run in others]
+        with fresh_folder(self.out) as folder, step("drawing the comparison"):
+            write_comparison(folder, helds)
+        for held in helds:
+            print(f"{held.run.name} against {reference.name}: {conclusion(held.comparison)}")
+        print(self.out / PAGE)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check(Verb):
+    """Hold results against accepted ones: better, worse, or no difference seen.
+
+    Exits with 1 if a watched metric got worse beyond chance and by more than matters.
+    """
+
+    results: Annotated[Positional[Path], Shown("RESULTS")]
+    """folder that run or reproduce has written"""
+    against: Annotated[Path, Shown("FILE", "evaluation/accepted.json")] = ACCEPTED
+    """file that accept has written, or folder of other results"""
+    markdown: Annotated[Path | None, Shown("FILE")] = None
+    """write the table for a pull request"""
+    junit: Annotated[Path | None, Shown("FILE")] = None
+    """write one test case per metric for continuous integration"""
+
+    def main(self) -> int:
+        from evaluation.judge.measured import Measured
+        from evaluation.judge.results import read_table
+        from evaluation.judge.verdict import Verdict, compare
+        from evaluation.show.comparison import verdict_table
+
+        before = self._reference()
+        after = Measured.of(read_table(self.results), before.condition)
+        comparison = compare(before, after)
+        verdict_table.print_comparison(comparison)
+        if self.markdown is not None:
+            self.markdown.write_text(verdict_table.markdown(comparison), encoding="utf-8")
+        if self.junit is not None:
+            self.junit.write_text(verdict_table.junit(comparison), encoding="utf-8")
+        return EXIT_WORSE if comparison.of(Verdict.WORSE) else EXIT_OK
+
+    def _reference(self) -> Measured:
+        from evaluation.judge.accepted import Accepted
+        from evaluation.judge.measured import Measured
+        from evaluation.judge.results import read_table
+
+        if self.against.is_dir():
+            return Measured.of(read_table(self.against))
+        return Accepted.read(self.against).measured()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Accept(Verb):
+    """Accept results: later changes are held against them.
+
+    Look at what moved by check first. The reason is kept in the file's history, with the
+    figures of all that was accepted before.
+    """
+
+    results: Annotated[Positional[Path], Shown("RESULTS")]
+    """folder that run or reproduce has written"""
+    reason: Annotated[str, Shown("TEXT")]
+    """why these figures are right; kept with them"""
+    to: Annotated[Path, Shown("FILE", "evaluation/accepted.json")] = ACCEPTED
+    """file to keep them in"""
+
+    def main(self) -> None:
+        from datetime import UTC, datetime
+
+        from evaluation.judge.accepted import Accepted
+        from evaluation.judge.measured import Measured
+        from evaluation.judge.results import SUMMARY, read_table
+        from evaluation.judge.summary import Summary
+
+        before = Accepted.read(self.to) if self.to.exists() else None
+        measured = Measured.of(read_table(self.results))
+        revision = Summary.read(self.results / SUMMARY).git_revision
+        today = datetime.now(UTC).date()
+        Accepted.of(measured, revision, self.reason, before, today).write(self.to)
+        print(f"{self.to}: accepted {measured.suite}, measured at {revision}")

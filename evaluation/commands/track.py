@@ -1,0 +1,107 @@
+"""`airground track`: one robot alone, through one front end or several."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from tyro.conf import Positional
+
+from airground.errors import InputError
+from airground.io.layout import HEADER
+from evaluation.commands.estimates import START_S, TRACK_S_PER_S, recorded
+from evaluation.commands.options import ConfigOptions, OutOption, SeedOption, Shown, Verb
+
+if TYPE_CHECKING:
+    from airground.core.cloud import Source
+    from airground.io.robot_recording import RobotRecording
+    from airground.slam.front_end import FrontEnd
+
+
+@dataclass(frozen=True, kw_only=True)
+class Track(ConfigOptions, SeedOption, OutOption, Verb):
+    """Track one robot alone, with one front end or several.
+
+    Leaves the trajectory and a summary; with several front ends one folder for each, and a
+    picture of their errors beside each other where the truth is known.
+    """
+
+    folder: Annotated[Positional[Path], Shown("FOLDER")]
+    """simulate's recording, EuRoC (MAV) or TUM RGB-D (ground robot)"""
+    robot: Annotated[Literal["mav", "ground"] | None, Shown("{mav,ground}", "by the layout")] = None
+    """which one, for a recording of simulate"""
+    front_end: Annotated[tuple[str, ...], Shown("NAME ...", "slam")] = ()
+    """slam, file, and for the ground robot open3d and opencv"""
+    trajectory: Annotated[Path | None, Shown("FILE")] = None
+    """poses for the front end file: TUM, of the camera, metric, z up"""
+    calibration: Annotated[Path | None, Shown("FILE", "the folder's own")] = None
+    """camera calibration (EuRoC's sensor.yaml)"""
+
+    def main(self) -> None:
+        from airground.io.open_recording import open_robot
+        from evaluation.run.own_recordings import print_alone, run_alone, write_alone
+        from evaluation.setup.output import fresh_folder
+        from evaluation.setup.progress import announce
+        from evaluation.show.figures.front_ends import draw_front_ends
+        from evaluation.table.true_camera import true_camera
+
+        names, robot = self._names(), self._source()
+        with fresh_folder(self.out) as out:
+            recording = open_robot(self.folder, robot, self.calibration)
+            true_pose = true_camera(recording)
+            front_ends = {name: self._front_end(name, recording) for name in names}
+            seconds = recording.duration_s
+            what = f"tracks {recorded(self.folder, seconds)} with {', '.join(names)}"
+            announce(what, START_S + len(names) * seconds * TRACK_S_PER_S)
+            results, summaries = {}, []
+            for name, front_end in front_ends.items():
+                results[name] = run_alone(recording, front_end)
+                folder = out if len(names) == 1 else out / name
+                folder.mkdir(exist_ok=True)
+                summaries.append(write_alone(folder, recording, name, results[name], true_pose))
+            if len(names) > 1:
+                draw_front_ends(out, recording, results, true_pose)
+        for summary in summaries:
+            print_alone(summary)
+
+    def _names(self) -> list[str]:
+        """The front ends, each once; a trajectory asks for the front end that follows it."""
+        names = self.front_end or (() if self.trajectory else ("slam",))
+        return list(dict.fromkeys([*names, *(("file",) if self.trajectory else ())]))
+
+    def _source(self) -> Source:
+        """The robot to track.
+
+        Raises:
+            InputError: The layout does not say which.
+        """
+        from airground.core.cloud import Source
+        from airground.io.plain_euroc import euroc_folder
+        from airground.io.plain_tum import is_tum_folder
+
+        if self.robot is not None:
+            return Source[self.robot.upper()]
+        if euroc_folder(self.folder) is not None and not (self.folder / HEADER).exists():
+            return Source.MAV
+        if is_tum_folder(self.folder):
+            return Source.GROUND
+        if (self.folder / HEADER).exists():
+            raise InputError(
+                f"{self.folder}: holds both robots; give --robot mav or --robot ground"
+            )
+        return Source.MAV  # what opens the folder says what is wrong with it
+
+    def _front_end(self, name: str, recording: RobotRecording[Any]) -> FrontEnd[Any]:
+        import numpy as np
+
+        from airground.core.cloud import Source
+        from airground.io.tum import read_tum
+        from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
+
+        rng = np.random.default_rng(self.checked_seed())
+        poses = None if self.trajectory is None else read_tum(self.trajectory)
+        given = Ingredients(recording.calibration, self.resolved_config(), rng, poses)
+        if recording.robot is Source.MAV:
+            return make_front_end(MAV, name, given)
+        return make_front_end(GROUND, name, given)
