@@ -14,7 +14,7 @@ from evaluation.commands.options import OutOption, Shown, Verb
 IN_PLACE_OF_A_WINDOW = create_mutex_group(required=False)
 
 if TYPE_CHECKING:
-    from evaluation.measure.showcase.showcase import Showcase
+    from evaluation.measure.showcase import Showcase
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -46,9 +46,9 @@ class Bench(SensorOption, SeedOption, Verb):
 
         from rich.console import Console
 
+        from evaluation.bench.publish import print_table
         from evaluation.bench.rows import checked_names
         from evaluation.bench.run import run_benchmark
-        from evaluation.bench.table import print_table
         from evaluation.setup.output import check_free
         from evaluation.setup.progress import announce, step
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from airground.core.messages import RobotCalibration
     from airground.io.recording import Recording
     from evaluation.judge.summary import Summary
-    from evaluation.measure.showcase.showcase import Showcase
+    from evaluation.measure.showcase import Showcase
     from evaluation.run.drops import DropList
     from evaluation.run.onlooker import Onlooker
     from evaluation.run.recording import RunResult
