@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
@@ -14,6 +13,9 @@ from evaluation.show.figures.fig07_height_maps import draw_costs, mark_truth
 from evaluation.show.figures.style import WIDE_IN, styled
 
 PARTICLES = "#35C46A"
+SIGMAS = 2.0
+"""Half axes of the covariance ellipse, in standard deviations."""
+ELLIPSE_STEPS = 48
 ZOOM_BELOW_M = 0.25
 """Particles with a smaller spread are also drawn enlarged."""
 ZOOM_M = 0.3
@@ -44,7 +46,9 @@ def _draw_step(axes: Axes, step: LocalizationStep) -> None:
         *belief.particles[:, :2].T, ".", color=PARTICLES, markersize=3.6, markeredgewidth=0,
         alpha=0.85, label=f"{len(belief.particles)} particles",
     )  # fmt: skip
-    axes.add_patch(covariance_ellipse(belief.estimate[:2], belief.covariance))
+    outline = ellipse_points(belief.estimate[:2], belief.covariance)
+    shadow = [withStroke(linewidth=2.1, foreground="#555555")]
+    axes.plot(*outline.T, color="white", linewidth=1.3, zorder=4, path_effects=shadow)
     mark_truth(axes, step.true_u)
 
 
@@ -62,14 +66,9 @@ def _zoom(axes: Axes, step: LocalizationStep) -> None:
     axes.indicate_inset_zoom(inset, edgecolor="black", alpha=0.7)
 
 
-def covariance_ellipse(mean: NDArray, covariance: NDArray, sigmas: float = 2.0) -> Ellipse:
-    """White outline of a 2-D Gaussian; widths are 2 * sigmas standard deviations."""
+def ellipse_points(mean: NDArray, covariance: NDArray) -> NDArray[np.float64]:
+    """(N, 2) a closed line around a 2-D Gaussian, `SIGMAS` standard deviations from its mean."""
     variances, axes = np.linalg.eigh(covariance)
-    width, height = 2 * sigmas * np.sqrt(np.maximum(variances, 1e-8))
-    angle = np.degrees(np.arctan2(axes[1, 0], axes[0, 0]))
-    ellipse = Ellipse(
-        tuple(mean), width, height, angle=angle, fill=False, edgecolor="white", linewidth=1.3
-    )
-    ellipse.set_path_effects([withStroke(linewidth=2.1, foreground="#555555")])
-    ellipse.set_zorder(4)
-    return ellipse
+    angle = np.linspace(0, 2 * np.pi, ELLIPSE_STEPS + 1)
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    return mean + SIGMAS * (circle * np.sqrt(np.maximum(variances, 0))) @ axes.T

@@ -1,3 +1,4 @@
-"""A run to look into with rerun: every stage in sensor time, as it happened.
+"""A run as a recording of rerun: every stage, in sensor time.
 
-Entities under `/truth` show what only the evaluator knows."""
+Entities under `/truth` need the ground truth, which no robot has. Each class here is an onlooker
+of a run that draws its part on one `SensorStream`."""

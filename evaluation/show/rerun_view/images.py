@@ -57,13 +57,7 @@ SHADES = 255
 
 
 class Images:
-    """Both image streams.
-
-    Args:
-        stream: Output.
-        level: Rates, size and quality.
-        calibrations: Calibration of each robot.
-    """
+    """Both image streams, with the frustums of their cameras."""
 
     def __init__(
         self, stream: SensorStream, level: Level, calibrations: Mapping[Source, RobotCalibration]
@@ -138,13 +132,7 @@ def _drawn(corners: TrackedCorners | None, scale: float) -> rr.Points2D:
 
 
 class DepthMaps:
-    """Depth maps, and their errors.
-
-    Args:
-        stream: Output.
-        level: Rate.
-        truth: Reference for errors; None leaves them out.
-    """
+    """Depth maps; with truth also their errors."""
 
     def __init__(self, stream: SensorStream, level: Level, truth: Truth | None) -> None:
         self._stream, self._truth = stream, truth

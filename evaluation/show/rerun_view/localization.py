@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from airground.core.belief import Belief, CostMap, HeightMap
 from airground.core.events import BeliefUpdated, CostMapComputed, HeightMapsMade
 from evaluation.run.onlooker import Seen
-from evaluation.show.figures.fig08_particles import PARTICLES
+from evaluation.show.figures.fig08_particles import PARTICLES, ellipse_points
 from evaluation.show.figures.style import COST_COLOURS, HEIGHT_COLOURS, value_range
 from evaluation.show.rerun_view.images import coloured
 from evaluation.show.rerun_view.sensor_stream import (
@@ -24,9 +24,6 @@ from sim.recording.truth import Truth
 
 ROOM = "localization"
 TRUE_POSITION = f"{TRUTH}/position"
-SIGMAS = 2.0
-"""Half axes of the ellipse, in standard deviations."""
-ELLIPSE_STEPS = 48
 WHITE = (255, 255, 255)
 CROSS_PX = 7.0
 ROOM_TO_GROW = 1.3
@@ -34,12 +31,7 @@ ROOM_TO_GROW = 1.3
 
 
 class Localization:
-    """Input and belief of the particle filter.
-
-    Args:
-        stream: Output.
-        truth: Source of the true position; None leaves it out.
-    """
+    """Input and belief of the particle filter; with truth also the true position."""
 
     def __init__(self, stream: SensorStream, truth: Truth | None) -> None:
         self._stream, self._truth = stream, truth
@@ -153,30 +145,9 @@ def upright(cells: NDArray) -> NDArray:
     return cells.T[::-1]
 
 
-def cell_pixels(
-    points: NDArray, origin: NDArray, cells_per_m: float, rows: int
-) -> NDArray[np.float32]:
-    """(N, 2) pixels of points (N, 2) [m] on the picture of a grid.
-
-    Args:
-        points: Points in the frame of the grid [m].
-        origin: (2,) centre of cell [0, 0] [m].
-        cells_per_m: Resolution.
-        rows: Height of the picture: cells along y.
-    """
-    cells = (np.asarray(points, np.float64) - origin) * cells_per_m + 0.5
-    return np.stack([cells[:, 0], rows - cells[:, 1]], axis=1).astype(np.float32)
-
-
 def on_costs(points_ground: NDArray, cost_map: CostMap) -> NDArray[np.float32]:
     """(N, 2) pixels of the cost map's picture for points (N, 2) in `ground` [m]."""
+    points = np.asarray(points_ground, np.float64)
+    cells = (points - cost_map.origin) * cost_map.cells_per_m + 0.5
     rows = cost_map.costs.shape[1]
-    return cell_pixels(points_ground, cost_map.origin, cost_map.cells_per_m, rows)
-
-
-def ellipse_points(mean: NDArray, covariance: NDArray) -> NDArray[np.float64]:
-    """(N, 2) a closed line around a 2-D Gaussian, `SIGMAS` standard deviations from its mean."""
-    variances, axes = np.linalg.eigh(covariance)
-    angle = np.linspace(0, 2 * np.pi, ELLIPSE_STEPS + 1)
-    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    return mean + SIGMAS * (circle * np.sqrt(np.maximum(variances, 0))) @ axes.T
+    return np.stack([cells[:, 0], rows - cells[:, 1]], axis=1).astype(np.float32)

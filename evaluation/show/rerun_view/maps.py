@@ -38,13 +38,7 @@ FIRST_STRIDE_PX = 6
 
 
 class Maps:
-    """Clouds of both robots, thinned for the viewer.
-
-    Args:
-        stream: Output.
-        level: Rate and spacing.
-        ground_camera: Camera of the ground robot.
-    """
+    """Clouds of both robots, thinned for the viewer."""
 
     def __init__(self, stream: SensorStream, level: Level, ground_camera: PinholeCamera) -> None:
         self._stream, self._voxel_m = stream, level.voxel_m
@@ -123,12 +117,7 @@ class Maps:
 
 
 class FirstKeyframes:
-    """The ground robot's depth until its map is first fused, for the MAV's first surface.
-
-    Args:
-        camera: Camera of the depth images.
-        voxel_m: Spacing of the points [m].
-    """
+    """The ground robot's depth until its map is first fused, for the MAV's first surface."""
 
     def __init__(self, camera: PinholeCamera, voxel_m: float) -> None:
         self._rays = camera.rays()[::FIRST_STRIDE_PX, ::FIRST_STRIDE_PX].reshape(-1, 3)

@@ -107,12 +107,7 @@ class MovingCamera:
 
 
 class Robots:
-    """Both cameras and their paths, each in its robot's map.
-
-    Args:
-        stream: Output.
-        level: Rates.
-    """
+    """Both cameras and their paths, each in its robot's map."""
 
     def __init__(self, stream: SensorStream, level: Level) -> None:
         self._cameras = {
@@ -138,14 +133,7 @@ class Robots:
 
 
 class TrueRobots:
-    """True cameras and their paths, and the true scene.
-
-    Args:
-        stream: Output.
-        level: Rates.
-        truth: Source of the poses and the scene.
-        calibrations: Calibration of each robot, which shapes its frustum.
-    """
+    """True cameras with their frustums and paths, and the true scene."""
 
     def __init__(
         self,

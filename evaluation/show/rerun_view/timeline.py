@@ -55,15 +55,10 @@ class LivePoses:
 
 
 class Curves:
-    """Curves of a run.
+    """Curves of a run; with truth also errors.
 
     Errors are those of the belief ("particles"), of the alignment ("refined"), and of the
     newest poses under the newest accepted alignment ("live").
-
-    Args:
-        stream: Output.
-        level: Rates.
-        truth: Reference for errors; None leaves them out.
     """
 
     def __init__(self, stream: SensorStream, level: Level, truth: Truth | None) -> None:
@@ -136,11 +131,7 @@ NAMES = {Source.MAV: "MAV", Source.GROUND: "ground robot"}
 
 
 class Messages:
-    """A log of changes in tracking, and of the outcome of each stage above it.
-
-    Args:
-        stream: Output.
-    """
+    """A log of changes in tracking, and of the outcome of each stage above it."""
 
     def __init__(self, stream: SensorStream) -> None:
         self._stream = stream

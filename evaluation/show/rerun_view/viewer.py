@@ -67,7 +67,7 @@ def has_screen() -> bool:
 
 def show(file: Path) -> int:
     """Open a file in a window; returns the exit code once that is closed."""
-    with _running(str(file), *_listening(free_ports())) as viewer:
+    with _running(free_ports(), str(file)) as viewer:
         return viewer.wait()
 
 
@@ -80,7 +80,7 @@ def serving(ports: Ports, file: Path | None = None) -> Iterator[subprocess.Popen
     """
     shown = () if file is None else (str(file),)
     web = ("--serve-web", "--web-viewer-port", str(ports.web))
-    with _running(*shown, *web, *_listening(ports)) as server:
+    with _running(ports, *shown, *web) as server:
         _wait_until_open(server, ports.data)
         _wait_until_open(server, ports.web)
         yield server
@@ -93,7 +93,7 @@ def window(ports: Ports, *options: str) -> Iterator[subprocess.Popen[bytes]]:
     Raises:
         AirgroundError: The viewer does not start, or cannot draw.
     """
-    viewer = _start(*options, "--expect-data-soon", *_listening(ports))
+    viewer = _start(ports, *options, "--expect-data-soon")
     try:
         _wait_until_open(viewer, ports.data)
         _see_it_stay(viewer)
@@ -148,23 +148,21 @@ def _free_port(wanted: int) -> int:
     raise AirgroundError("no free port on loopback")
 
 
-def _listening(ports: Ports) -> tuple[str, ...]:
-    return "--bind", LOOPBACK, "--port", str(ports.data)
-
-
 @contextmanager
-def _running(*words: str) -> Iterator[subprocess.Popen[bytes]]:
-    process = _start(*words)
+def _running(ports: Ports, *words: str) -> Iterator[subprocess.Popen[bytes]]:
+    process = _start(ports, *words)
     try:
         yield process
     finally:
         _stop(process)
 
 
-def _start(*words: str) -> subprocess.Popen[bytes]:
+def _start(ports: Ports, *words: str) -> subprocess.Popen[bytes]:
     # Its log would mix with ours; its exit code reports a failure.
     return subprocess.Popen(
-        [str(program()), *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        [str(program()), *words, "--bind", LOOPBACK, "--port", str(ports.data)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
     )
 
 

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from airground.core.belief import HeightMap
+from airground.core.belief import CostMap, HeightMap
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from evaluation.show.rerun_view.images import SHADES, shade_index
-from evaluation.show.rerun_view.localization import cell_pixels, cut_out, upright
+from evaluation.show.rerun_view.localization import cut_out, on_costs, upright
 from evaluation.show.rerun_view.robots import STEP_NS, GrowingPath
 from evaluation.show.rerun_view.sensor_stream import Pace
 
@@ -44,10 +44,10 @@ def test_what_is_cut_out_stays_where_it_was(
 
 @given(st.integers(0, 4), st.integers(0, 3))
 def test_a_cell_is_drawn_in_the_middle_of_its_pixel(ix: int, iy: int) -> None:
-    cells = np.zeros((5, 4))
+    cells = np.zeros((5, 4), np.float32)
     cells[ix, iy] = 1
-    origin = np.array([2.0, -1.0])
-    (pixel,) = cell_pixels((origin + np.array([ix, iy]) / 50)[None], origin, 50, 4)
+    made = CostMap(cells, np.array([2.0, -1.0]), 50.0, 0.0, "ncc")
+    (pixel,) = on_costs((made.origin + np.array([ix, iy]) / 50)[None], made)
     row, column = np.argwhere(upright(cells) == 1)[0]
     np.testing.assert_allclose(pixel, (column + 0.5, row + 0.5), atol=1e-5)
 

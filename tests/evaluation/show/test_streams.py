@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 from airground.core.se3 import SE3
-from evaluation.show.rerun_view.localization import ellipse_points, on_costs
+from evaluation.show.rerun_view.localization import on_costs
 from evaluation.show.rerun_view.maps import GLIDE_NS
 from evaluation.show.rerun_view.run_view import layout
 from evaluation.show.rerun_view.sensor_stream import LEVELS
@@ -168,13 +168,6 @@ def test_the_true_position_is_that_of_fig_8(read: ReadBack) -> None:
     np.testing.assert_allclose(
         strips.mean(axis=(0, 1)), on_costs(true_u[None], COSTS)[0], atol=1e-4
     )
-
-
-def test_an_ellipse_has_the_covariance_it_was_made_of() -> None:
-    covariance = np.array([[0.05, 0.02], [0.02, 0.03]])
-    points = ellipse_points(np.array([1.0, 2.0]), covariance) - (1.0, 2.0)
-    distance = np.einsum("ni,ij,nj->n", points, np.linalg.inv(covariance), points)
-    np.testing.assert_allclose(distance, 4.0)
 
 
 def test_the_surface_lands_where_it_was_aligned(read: ReadBack) -> None:
