@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from airground.core.arrays import read_only
+from airground.core.arrays import U8, read_only
 from airground.core.cloud import PointCloud, Source
 from airground.core.se3 import SE3
 from airground.core.surface import AerialSurface
@@ -24,7 +23,7 @@ class AugmentedMap:
     """
 
     cloud_ground: PointCloud
-    sources: NDArray[np.uint8]
+    sources: U8
 
     def __post_init__(self) -> None:
         n = len(self.cloud_ground)

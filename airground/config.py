@@ -260,11 +260,7 @@ def paper() -> Config:
         fusion=Fusion(min_observations=1),
         height_maps=HeightMaps(cells_per_m=50.0),
         localization=Localization(
-            cost="zmssd",
-            sigma=0.08,
-            min_overlap=0.5,
-            estimate="mean",
-            redrawn_fraction=0.0,
+            cost="zmssd", sigma=0.08, min_overlap=0.5, estimate="mean", redrawn_fraction=0.0
         ),
         refinement=Refinement(local_search=False, level_prior=False),
     )

@@ -12,8 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F32, I64
 from airground.core.belief import HeightMap
 from airground.core.height_map import lattice_index
 
@@ -58,7 +58,7 @@ def agreement(aerial: HeightMap, ground: HeightMap) -> Agreement:
     return Agreement(cells, share, max(fair, default=1.0))
 
 
-def _agreeing(aerial: NDArray, ground: NDArray, first: NDArray) -> tuple[int, float]:
+def _agreeing(aerial: F32, ground: F32, first: I64) -> tuple[int, float]:
     """Overlapping cells and the share that agrees, with aerial [0, 0] at `first` in ground."""
     low = np.maximum(-first, 0)
     high = np.minimum(aerial.shape, np.array(ground.shape) - first)

@@ -1,22 +1,43 @@
-"""Checks that give an array its contract once, when it enters a data type."""
+"""Types of arrays by their elements, and a check of shape and type when data are built.
+
+`F64` is an array of 64-bit floats, `U8` one of unsigned bytes, and so on; shapes stand in the
+docstrings.
+"""
 
 from collections.abc import Sequence
+from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, DTypeLike, NDArray
+from numpy.typing import ArrayLike, NDArray
+
+F32 = NDArray[np.float32]
+F64 = NDArray[np.float64]
+Floats = NDArray[np.floating]
+"""Floats of either width."""
+C64 = NDArray[np.complex64]
+I8 = NDArray[np.int8]
+I16 = NDArray[np.int16]
+I32 = NDArray[np.int32]
+I64 = NDArray[np.int64]
+U8 = NDArray[np.uint8]
+U16 = NDArray[np.uint16]
+U32 = NDArray[np.uint32]
+U64 = NDArray[np.uint64]
+Mask = NDArray[np.bool_]
+
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 def read_only(
-    value: ArrayLike, name: str, shape: Sequence[int | None], dtype: DTypeLike
-) -> NDArray:
-    """Return `value` as a contiguous array of `dtype` that nobody can write to.
+    value: ArrayLike, name: str, shape: Sequence[int | None], dtype: type[Scalar]
+) -> NDArray[Scalar]:
+    """Return `value` as a contiguous, read-only array of `dtype`.
 
     Args:
-        value: Anything numpy can make an array of. An array that already fits is not
-            copied; a read-only view of it is returned.
-        name: How the array is called in the error message.
+        value: Anything that numpy can make an array of; not copied where it fits already.
+        name: Name of the array in the error message.
         shape: Expected shape; None leaves a dimension free.
-        dtype: Element type of the result. Conversions that lose information raise.
+        dtype: Element type of the result.
 
     Raises:
         ValueError: The shape differs, or the conversion to `dtype` is not safe.

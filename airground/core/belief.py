@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from airground.core.arrays import read_only
+from airground.core.arrays import F32, F64, read_only
 from airground.core.se3 import SE3
 
 
@@ -21,8 +20,8 @@ class HeightMap:
         cells_per_m: Resolution.
     """
 
-    heights: NDArray[np.float32]
-    origin: NDArray[np.float64]
+    heights: F32
+    origin: F64
     cells_per_m: float
 
     def __post_init__(self) -> None:
@@ -50,8 +49,8 @@ class CostMap:
         cost: Which cost: "zmssd" [m^2] or "ncc" [1 - correlation].
     """
 
-    costs: NDArray[np.float32]
-    origin: NDArray[np.float64]
+    costs: F32
+    origin: F64
     cells_per_m: float
     heading: float
     cost: str
@@ -60,7 +59,7 @@ class CostMap:
         object.__setattr__(self, "costs", read_only(self.costs, "costs", (None,) * 2, np.float32))
         object.__setattr__(self, "origin", read_only(self.origin, "origin", (2,), np.float64))
 
-    def best(self) -> NDArray[np.float64] | None:
+    def best(self) -> F64 | None:
         """(2,) the u of lowest cost [m] (Eq. 3), or None where no overlap suffices."""
         if not np.isfinite(self.costs).any():
             return None
@@ -85,9 +84,9 @@ class Belief:
     """
 
     stamp_ns: int
-    particles: NDArray[np.float64]
-    estimate: NDArray[np.float64]
-    covariance: NDArray[np.float64]
+    particles: F64
+    estimate: F64
+    covariance: F64
     cost: float
     height_offset: float
     T_ground_mav: SE3

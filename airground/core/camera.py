@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from airground.core.arrays import F64, Floats
 
 
 @dataclass(frozen=True)
@@ -37,18 +38,18 @@ class PinholeCamera:
         if not (self.fx > 0 and self.fy > 0):
             raise ValueError(f"focal lengths must be positive, got {self.fx}, {self.fy}")
 
-    def matrix(self) -> NDArray[np.float64]:
+    def matrix(self) -> F64:
         """The (3, 3) intrinsic matrix."""
         return np.array([[self.fx, 0, self.cx], [0, self.fy, self.cy], [0, 0, 1.0]])
 
-    def project(self, points_camera: NDArray) -> NDArray[np.float64]:
+    def project(self, points_camera: Floats) -> F64:
         """Pixels (N, 2) as (x, y) of points (N, 3) [m]; NaN where z <= 0."""
         x, y, z = np.asarray(points_camera, dtype=np.float64).T
         with np.errstate(divide="ignore", invalid="ignore"):
             z = np.where(z > 0, z, np.nan)
             return np.stack([self.fx * x / z + self.cx, self.fy * y / z + self.cy], axis=1)
 
-    def rays(self) -> NDArray[np.float64]:
+    def rays(self) -> F64:
         """(height, width, 3) directions with z = 1 through every pixel centre."""
         x = (np.arange(self.width) - self.cx) / self.fx
         y = (np.arange(self.height) - self.cy) / self.fy
@@ -56,7 +57,7 @@ class PinholeCamera:
         rays[..., 0], rays[..., 1] = x[None, :], y[:, None]
         return rays
 
-    def back_project(self, depth: NDArray) -> NDArray:
+    def back_project(self, depth: Floats) -> Floats:
         """(height, width, 3) points [m] in the camera; NaN where depth is NaN.
 
         Args:

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
-from airground.core.arrays import read_only
+from airground.core.arrays import F32, U8, read_only
 
 
 class Source(IntEnum):
@@ -28,9 +27,9 @@ class PointCloud:
         normals: (N, 3) float32 unit vectors, or None where nobody computed them.
     """
 
-    points: NDArray[np.float32]
-    colours: NDArray[np.uint8]
-    normals: NDArray[np.float32] | None = None
+    points: F32
+    colours: U8
+    normals: F32 | None = None
 
     def __post_init__(self) -> None:
         points = read_only(self.points, "points", (None, 3), np.float32)

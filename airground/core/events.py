@@ -8,9 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from airground.core.arrays import F64
 from airground.core.belief import Alignment, Belief, CostMap, HeightMap
 from airground.core.cloud import PointCloud, Source
 from airground.core.se3 import SE3
@@ -38,7 +36,7 @@ class MavTracked(Event):
     """
 
     T_mav_camera: SE3
-    covariance: NDArray[np.float64] | None = None
+    covariance: F64 | None = None
     scale_sigma: float | None = None
 
 
@@ -53,7 +51,7 @@ class GroundTracked(Event):
     """
 
     T_ground_camera: SE3
-    covariance: NDArray[np.float64] | None = None
+    covariance: F64 | None = None
     scale_sigma: float | None = None
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from airground.core.arrays import F32, I64, Floats
 from airground.core.belief import HeightMap
 
 
 def make_height_map(
-    points: NDArray,
+    points: Floats,
     cells_per_m: float,
     dilate_holes: bool = True,
     window: tuple[ArrayLike, ArrayLike] | None = None,
@@ -45,13 +46,13 @@ def make_height_map(
     return HeightMap(heights, first / cells_per_m, cells_per_m)
 
 
-def lattice_index(height_map: HeightMap) -> NDArray[np.int64]:
+def lattice_index(height_map: HeightMap) -> I64:
     """(2,) the origin of a map on the lattice of whole multiples of its cell size."""
     return np.rint(height_map.origin * height_map.cells_per_m).astype(np.int64)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _cell_extent(points: NDArray, cells_per_m: np.float32) -> NDArray[np.int64]:
+def _cell_extent(points: F32, cells_per_m: np.float32) -> I64:
     """(2, 2) lowest and highest cell index of finite points; reversed without any."""
     half = np.float32(0.5)
     extent = np.array([[2**40, 2**40], [-(2**40), -(2**40)]])
@@ -68,7 +69,7 @@ def _cell_extent(points: NDArray, cells_per_m: np.float32) -> NDArray[np.int64]:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _raise_cells(
-    points: NDArray, first_x: int, first_y: int, cells_per_m: np.float32, heights: NDArray
+    points: F32, first_x: int, first_y: int, cells_per_m: np.float32, heights: F32
 ) -> None:
     half = np.float32(0.5)
     for i in range(points.shape[0]):
@@ -83,7 +84,7 @@ def _raise_cells(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _dilate_holes(heights: NDArray) -> NDArray:
+def _dilate_holes(heights: F32) -> F32:
     nx, ny = heights.shape
     filled = heights.copy()
     for ix in range(nx):

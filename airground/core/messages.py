@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from airground.core.arrays import read_only
+from airground.core.arrays import F32, F64, I64, U8, read_only
 from airground.core.camera import PinholeCamera
 from airground.core.cloud import Source
 from airground.core.se3 import SE3
@@ -23,7 +22,7 @@ class MavImage:
     """
 
     stamp_ns: int
-    image: NDArray[np.uint8]
+    image: U8
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "image", read_only(self.image, "image", (None, None), np.uint8))
@@ -40,8 +39,8 @@ class GroundImage:
     """
 
     stamp_ns: int
-    colour: NDArray[np.uint8]
-    depth: NDArray[np.float32]
+    colour: U8
+    depth: F32
 
     def __post_init__(self) -> None:
         colour = read_only(self.colour, "colour", (None, None, 3), np.uint8)
@@ -60,9 +59,9 @@ class ImuSamples:
         accelerometer: (N, 3) float64 [m/s^2]; at rest it reads +9.81 upwards.
     """
 
-    stamps_ns: NDArray[np.int64]
-    gyro: NDArray[np.float64]
-    accelerometer: NDArray[np.float64]
+    stamps_ns: I64
+    gyro: F64
+    accelerometer: F64
 
     def __post_init__(self) -> None:
         stamps = read_only(self.stamps_ns, "stamps_ns", (None,), np.int64)
@@ -92,8 +91,8 @@ class MagneticSamples:
         field: (N, 3) float64 [T].
     """
 
-    stamps_ns: NDArray[np.int64]
-    field: NDArray[np.float64]
+    stamps_ns: I64
+    field: F64
 
     def __post_init__(self) -> None:
         stamps = read_only(self.stamps_ns, "stamps_ns", (None,), np.int64)

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from airground.core.arrays import read_only
+from airground.core.arrays import F64, Floats, read_only
 
 ROTATION_TOLERANCE = 1e-6
 _NEWTON = 1.5 * np.eye(3)
@@ -33,8 +33,8 @@ class SE3:
         ValueError: A shape is wrong, a number is not finite, or the matrix is no rotation.
     """
 
-    rotation: NDArray[np.float64]
-    translation: NDArray[np.float64]
+    rotation: F64
+    translation: F64
 
     def __post_init__(self) -> None:
         rotation = read_only(self.rotation, "rotation", (3, 3), np.float64)
@@ -76,21 +76,23 @@ class SE3:
         """A turn by `heading` [rad] about z (counter-clockwise from above), then a shift."""
         return cls.from_rotation_vector((0.0, 0.0, heading), translation)
 
-    def matrix(self) -> NDArray[np.float64]:
+    def matrix(self) -> F64:
         """The (4, 4) homogeneous matrix."""
         matrix = np.eye(4)
         matrix[:3, :3] = self.rotation
         matrix[:3, 3] = self.translation
         return matrix
 
-    def quaternion_xyzw(self) -> NDArray[np.float64]:
+    def quaternion_xyzw(self) -> F64:
         """(4,) unit quaternion in TUM's order, with w >= 0."""
         quaternion = Rotation.from_matrix(self.rotation).as_quat()
-        return -quaternion if quaternion[3] < 0 else quaternion
+        result: F64 = -quaternion if quaternion[3] < 0 else quaternion
+        return result
 
-    def rotation_vector(self) -> NDArray[np.float64]:
+    def rotation_vector(self) -> F64:
         """(3,) axis times angle [rad]."""
-        return Rotation.from_matrix(self.rotation).as_rotvec()
+        result: F64 = Rotation.from_matrix(self.rotation).as_rotvec()
+        return result
 
     def angle(self) -> float:
         """Angle of the rotation [rad], in [0, pi] (angle-axis, as in Fig. 14)."""
@@ -107,8 +109,8 @@ class SE3:
     @overload
     def __matmul__(self, other: SE3) -> SE3: ...
     @overload
-    def __matmul__(self, other: NDArray) -> NDArray: ...
-    def __matmul__(self, other: SE3 | NDArray) -> SE3 | NDArray:
+    def __matmul__(self, other: Floats) -> F64: ...
+    def __matmul__(self, other: SE3 | Floats) -> SE3 | F64:
         """Compose with a motion, or move points of shape (3,) or (N, 3)."""
         if isinstance(other, SE3):
             rotation = self.rotation @ other.rotation
@@ -118,7 +120,7 @@ class SE3:
             return SE3(rotation, self.rotation @ other.translation + self.translation)
         return other @ self.rotation.T + self.translation
 
-    def log(self) -> NDArray[np.float64]:
+    def log(self) -> F64:
         """(6,) twist (rho, phi) [m, rad] with `SE3.exp(T.log()) == T`."""
         phi = self.rotation_vector()
         return np.concatenate([np.linalg.solve(_left_jacobian(phi), self.translation), phi])
@@ -132,7 +134,7 @@ class SE3:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _flaws(rotation: NDArray, translation: NDArray) -> tuple[float, bool]:
+def _flaws(rotation: F64, translation: F64) -> tuple[float, bool]:
     """By how much R R^T is off the identity, NaN where a number is not finite; whether det R < 0.
 
     Compiled, for poses are made tens of thousands of times a minute.
@@ -154,7 +156,7 @@ def _flaws(rotation: NDArray, translation: NDArray) -> tuple[float, bool]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def rotation_angle(rotation: NDArray) -> float:
+def rotation_angle(rotation: F64) -> float:
     """Angle of a rotation (3, 3) [rad], in [0, pi], exact to rounding everywhere."""
     r = rotation
     x, y, z = r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]
@@ -169,22 +171,21 @@ def interpolate(start: SE3, end: SE3, fraction: float) -> SE3:
     return SE3(nearest_rotation(rotation), translation)
 
 
-def nearest_rotation(matrix: NDArray) -> NDArray[np.float64]:
+def nearest_rotation(matrix: NDArray[Any]) -> F64:
     """The rotation closest to `matrix`."""
     u, _, vt = np.linalg.svd(matrix)
     if np.linalg.det(u @ vt) < 0:
         u[:, 2] *= -1
-    return u @ vt
+    result: F64 = u @ vt
+    return result
 
 
-def _left_jacobian(phi: NDArray) -> NDArray[np.float64]:
+def _left_jacobian(phi: F64) -> F64:
     """Left Jacobian of SO(3): couples turning and moving in exp and log."""
     angle = float(np.linalg.norm(phi))
     skew = np.array([[0, -phi[2], phi[1]], [phi[2], 0, -phi[0]], [-phi[1], phi[0], 0]])
-    if angle < 1e-5:
-        return np.eye(3) + 0.5 * skew + skew @ skew / 6.0
-    return (
-        np.eye(3)
-        + (1 - np.cos(angle)) / angle**2 * skew
-        + (angle - np.sin(angle)) / angle**3 * skew @ skew
-    )
+    jacobian: F64 = np.eye(3) + 0.5 * skew + skew @ skew / 6.0
+    if angle >= 1e-5:
+        linear, squared = (1 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
+        jacobian = np.eye(3) + linear * skew + squared * skew @ skew
+    return jacobian

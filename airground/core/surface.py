@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from airground.core.arrays import read_only
+from airground.core.arrays import F32, U8, read_only
 from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
@@ -29,8 +28,8 @@ class DepthMap:
     stamp_ns: int
     camera: PinholeCamera
     T_mav_camera: SE3
-    depth: NDArray[np.float32]
-    image: NDArray[np.uint8]
+    depth: F32
+    image: U8
     views: int
 
     def __post_init__(self) -> None:
@@ -57,7 +56,7 @@ class AerialSurface:
     reference_stamp_ns: int
     camera: PinholeCamera
     T_mav_camera: SE3
-    depth: NDArray[np.float32]
+    depth: F32
     cloud_mav: PointCloud
     depth_maps: int
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from airground.core.arrays import read_only
+from airground.core.arrays import F64, I64, read_only
 from airground.core.se3 import SE3, interpolate
 
 
@@ -22,9 +21,9 @@ class Trajectory:
         translations: (N, 3) float64 [m].
     """
 
-    stamps_ns: NDArray[np.int64]
-    rotations: NDArray[np.float64]
-    translations: NDArray[np.float64]
+    stamps_ns: I64
+    rotations: F64
+    translations: F64
 
     def __post_init__(self) -> None:
         stamps = read_only(self.stamps_ns, "stamps_ns", (None,), np.int64)
@@ -70,9 +69,10 @@ class Trajectory:
         t0, t1 = self.stamps_ns[after - 1], self.stamps_ns[after]
         return interpolate(self[after - 1], self[after], float(stamp_ns - t0) / float(t1 - t0))
 
-    def quaternions_xyzw(self) -> NDArray[np.float64]:
+    def quaternions_xyzw(self) -> F64:
         """(N, 4) unit quaternions in TUM's order."""
-        return Rotation.from_matrix(self.rotations).as_quat()
+        result: F64 = Rotation.from_matrix(self.rotations).as_quat()
+        return result
 
     def path_m(self) -> float:
         """Length of the path [m]."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64, I64, U8, Floats
 from airground.core.cloud import PointCloud
 
 _BITS = 21
@@ -30,9 +30,7 @@ class VoxelMap:
     def __len__(self) -> int:
         return len(self._keys)
 
-    def add(
-        self, points: NDArray, colours: NDArray[np.uint8], weights: NDArray | None = None
-    ) -> None:
+    def add(self, points: Floats, colours: U8, weights: Floats | None = None) -> None:
         """Take in points (N, 3) [m], colours (N, 3) and weights (N,), 1 each by default.
 
         Raises:
@@ -58,16 +56,14 @@ class VoxelMap:
             mean[:, :3].astype(np.float32), np.rint(mean[:, 3:]).clip(0, 255).astype(np.uint8)
         )
 
-    def _key(self, points: NDArray) -> NDArray[np.int64]:
+    def _key(self, points: Floats) -> I64:
         cell = np.floor(np.asarray(points, np.float64) / self.voxel_m).astype(np.int64) + _HALF
         if (cell < 0).any() or (cell >= 2 * _HALF).any():
             raise ValueError(f"a point lies more than {_HALF * self.voxel_m:.0f} m from the origin")
         return (cell[:, 0] << (2 * _BITS)) | (cell[:, 1] << _BITS) | cell[:, 2]
 
 
-def _sums(
-    inverse: NDArray, n: int, points: NDArray, colours: NDArray, weights: NDArray | None
-) -> NDArray[np.float64]:
+def _sums(inverse: I64, n: int, points: Floats, colours: U8, weights: Floats | None) -> F64:
     weight = np.ones(len(points)) if weights is None else np.asarray(weights, np.float64)
     columns = [np.ones(len(points)), weight]
     columns += [weight * points[:, i] for i in range(3)]

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from airground.core.arrays import I16, I32, U16
 from airground.dense.plane_sweep import CostVolume
 from airground.dense.sweep_kernels import COST_SCALE
 from airground.dense.workspace import Workspace
@@ -30,7 +30,7 @@ def aggregate(
     truncation: float,
     one_side_penalty: float,
     workspace: Workspace,
-) -> NDArray[np.uint16]:
+) -> U16:
     """Mean cost over a square window and over the views.
 
     Args:
@@ -67,13 +67,7 @@ def aggregate(
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
 def _slide_down(
-    costs: NDArray,
-    limits: NDArray,
-    enters: int,
-    leaves: int,
-    sums: NDArray,
-    counts: NDArray,
-    margin: int,
+    costs: U16, limits: I16, enters: int, leaves: int, sums: I32, counts: I32, margin: int
 ) -> None:
     """Image row `enters` joins the running window sums, and row `leaves` goes; -1 is no row."""
     _, planes, width = costs.shape
@@ -104,7 +98,7 @@ def _slide_down(
 
 
 @njit(cache=True, error_model="numpy")
-def _count_uncovered(limits: NDArray, count: NDArray, sign: int) -> None:
+def _count_uncovered(limits: I16, count: I32, sign: int) -> None:
     """Add to `count` (sign 1), or take away (-1), how many views miss each pixel of a row."""
     signed = np.int32(sign)
     # Most views cover most of a row.
@@ -117,7 +111,7 @@ def _count_uncovered(limits: NDArray, count: NDArray, sign: int) -> None:
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _window_sum(source: NDArray, out: NDArray, radius: int) -> None:
+def _window_sum(source: I32, out: I32, radius: int) -> None:
     """out[x] = sum of source[x : x + 2 radius + 1]."""
     width = len(out)
     middle = source[radius : radius + width]
@@ -136,15 +130,15 @@ def _window_sum(source: NDArray, out: NDArray, radius: int) -> None:
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
 def box_mean(
-    first: NDArray,
-    first_limits: NDArray,
-    last: NDArray,
-    last_limits: NDArray,
+    first: U16,
+    first_limits: I16,
+    last: U16,
+    last_limits: I16,
     both: bool,
     radius: int,
     uncovered: float,
     penalty: float,
-    mean: NDArray,
+    mean: U16,
 ) -> None:
     """Fills `mean`; see `aggregate`.
 
@@ -192,9 +186,7 @@ def box_mean(
 
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
-def _mean(
-    total: NDArray, count: NDArray, factor: np.float32, ceiling: np.float32, out: NDArray
-) -> None:
+def _mean(total: I32, count: I32, factor: np.float32, ceiling: np.float32, out: U16) -> None:
     """Sum over number of samples, as stored."""
     for x in range(len(out)):
         value = factor * np.float32(total[x]) / np.float32(max(count[x], np.int32(1)))
@@ -203,12 +195,7 @@ def _mean(
 
 @njit(cache=True, error_model="numpy", fastmath=FAST)
 def _mean_of_sides(
-    total: NDArray,
-    count: NDArray,
-    factor: np.float32,
-    ceiling: np.float32,
-    alone: np.float32,
-    out: NDArray,
+    total: I32, count: I32, factor: np.float32, ceiling: np.float32, alone: np.float32, out: U16
 ) -> None:
     """The mean over both sides, or over the better one plus a penalty, whichever is lower."""
     one = np.int32(1)
@@ -224,7 +211,7 @@ def _mean_of_sides(
 
 
 @njit(cache=True, error_model="numpy")
-def _transpose(block: NDArray, out: NDArray) -> None:
+def _transpose(block: U16, out: U16) -> None:
     """out = block.T in tiles that fit the cache's lines."""
     planes, width = block.shape
     for x0 in range(0, width, 32):

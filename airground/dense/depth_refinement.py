@@ -5,9 +5,9 @@ from __future__ import annotations
 import cv2
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
 from airground.config import PlaneSweep as Parameters
+from airground.core.arrays import F32, U16, Mask
 from airground.dense.aggregation import aggregate
 from airground.dense.plane_sweep import PlaneSweep
 from airground.dense.semiglobal import smooth
@@ -24,7 +24,7 @@ SPECKLE_STEP_PLANES = 4.0
 """... where neighbours at most this many planes apart are connected."""
 
 
-def depth_from_costs(sweep: PlaneSweep, parameters: Parameters) -> NDArray[np.float32]:
+def depth_from_costs(sweep: PlaneSweep, parameters: Parameters) -> F32:
     """The depth map of a finished sweep.
 
     Returns:
@@ -56,16 +56,17 @@ def depth_from_costs(sweep: PlaneSweep, parameters: Parameters) -> NDArray[np.fl
     return np.where(believed, depth, np.nan).astype(np.float32)
 
 
-def _speckles(plane: NDArray[np.float32]) -> NDArray[np.bool_]:
+def _speckles(plane: F32) -> Mask:
     """Pixels in small patches that stand out from their surroundings."""
     scaled = np.where(np.isfinite(plane), plane * 16, -16).astype(np.int16)
     cleaned = scaled.copy()
     cv2.filterSpeckles(cleaned, -16, SPECKLE_PX, int(16 * SPECKLE_STEP_PLANES))
-    return (cleaned == -16) & (scaled != -16)
+    result: Mask = (cleaned == -16) & (scaled != -16)
+    return result
 
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
-def pick(costs: NDArray, mean: NDArray, plane: NDArray, sigma: NDArray) -> None:
+def pick(costs: U16, mean: U16, plane: F32, sigma: F32) -> None:
     """The winning plane of each pixel, its sub-plane position and how sure it is.
 
     Args:

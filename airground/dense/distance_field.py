@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from airground.core.arrays import F32, F64, U32
 from airground.core.surface import DepthMap
 from airground.dense.volume import Volume
 
@@ -21,7 +21,7 @@ MAX_BINS = 8
 MAX_DEPTH_MAPS = 15
 
 
-def bin_centres(bins: int) -> NDArray[np.float64]:
+def bin_centres(bins: int) -> F64:
     """(bins,) the values c_j that the bins stand for, evenly spaced in [-1, 1]."""
     return (2 * np.arange(bins) + 1) / bins - 1.0
 
@@ -38,11 +38,7 @@ class FieldHistogram:
     """
 
     def __init__(
-        self,
-        volume: Volume,
-        truncation_m: float,
-        bins: int = MAX_BINS,
-        memory: NDArray[np.uint32] | None = None,
+        self, volume: Volume, truncation_m: float, bins: int = MAX_BINS, memory: U32 | None = None
     ) -> None:
         if not 2 <= bins <= MAX_BINS:
             raise ValueError(f"a histogram has 2 to {MAX_BINS} bins, got {bins}")
@@ -85,13 +81,13 @@ class FieldHistogram:
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
 def add_field(
-    counts: NDArray,
-    depth: NDArray,
+    counts: U32,
+    depth: F32,
     width: int,
     height: int,
-    matrix: NDArray,
-    shift: NDArray,
-    plane_depths: NDArray,
+    matrix: F32,
+    shift: F32,
+    plane_depths: F32,
     inverse_truncation: float,
     bins: int,
 ) -> None:

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from airground.core.arrays import F32, U32
 from airground.dense.distance_field import MAX_BINS
 
 FAST = {"contract", "reassoc", "arcp", "nsz"}
@@ -32,9 +32,9 @@ class Fusion:
         self.data_weight = data_weight
         self.iterations = iterations
         self.spacing = 2.0 / bins
-        self._memory: NDArray[np.float32] | None = None
+        self._memory: F32 | None = None
 
-    def fuse(self, counts: NDArray[np.uint32]) -> NDArray[np.float32]:
+    def fuse(self, counts: U32) -> F32:
         """The field phi.
 
         Args:
@@ -52,11 +52,12 @@ class Fusion:
                 min(AT_ONCE, self.iterations - done), done == 0,
                 counts, self.spacing, phi, ahead, dy, dk, dx, STEP, STEP * self.data_weight,
             )  # fmt: skip
-        return phi
+        result: F32 = phi
+        return result
 
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
-def start(counts: NDArray, spacing: float, phi: NDArray) -> None:
+def start(counts: U32, spacing: float, phi: F32) -> None:
     """phi at the mean of its histogram."""
     rows, planes, columns = counts.shape
     width = np.float32(spacing)
@@ -78,13 +79,13 @@ def start(counts: NDArray, spacing: float, phi: NDArray) -> None:
 def iterate(
     times: int,
     from_start: bool,
-    counts: NDArray,
+    counts: U32,
     spacing: float,
-    phi: NDArray,
-    ahead: NDArray,
-    dy: NDArray,
-    dk: NDArray,
-    dx: NDArray,
+    phi: F32,
+    ahead: F32,
+    dy: F32,
+    dk: F32,
+    dx: F32,
     step: float,
     weight: float,
 ) -> None:
@@ -153,15 +154,7 @@ def step_row(row, dual, fresh, primal, fields, sizes):  # type: ignore[no-untype
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
-def dual_step(
-    here: NDArray,
-    down: NDArray,
-    deep: NDArray,
-    a: NDArray,
-    b: NDArray,
-    c: NDArray,
-    sigma: np.float32,
-) -> None:
+def dual_step(here: F32, down: F32, deep: F32, a: F32, b: F32, c: F32, sigma: np.float32) -> None:
     """p <- project(p + sigma grad phi_ahead) onto the unit ball, along a line."""
     one = np.float32(1)
     last = len(here) - 1
@@ -183,14 +176,7 @@ def dual_step(
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def descend(
-    phi: NDArray,
-    a: NDArray,
-    b: NDArray,
-    c: NDArray,
-    a_before: NDArray,
-    b_before: NDArray,
-    tau: np.float32,
-    moved: NDArray,
+    phi: F32, a: F32, b: F32, c: F32, a_before: F32, b_before: F32, tau: np.float32, moved: F32
 ) -> None:
     """phi + tau div p along a line, written to `moved`."""
     moved[0] = phi[0] + tau * (a[0] - a_before[0] + b[0] - b_before[0] + c[0])
@@ -200,12 +186,7 @@ def descend(
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def primal_step(
-    moved: NDArray,
-    word: NDArray,
-    phi: NDArray,
-    ahead: NDArray,
-    data_weight: np.float32,
-    width: np.float32,
+    moved: F32, word: U32, phi: F32, ahead: F32, data_weight: np.float32, width: np.float32
 ) -> None:
     """phi <- prox(moved) along a line, and the extrapolation 2 phi_new - phi_old.
 

@@ -10,12 +10,14 @@ of the halved reference, and interpolating it adds next to none.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from airground.config import PlaneSweep as Parameters
+from airground.core.arrays import F32, F64, I16, I32, U8, U16
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.dense import sweep_kernels as kernels
@@ -31,14 +33,14 @@ GAIN_MIN_SAMPLES = 30
 """... and left alone where fewer of them overlap."""
 
 
-def inverse_depth_planes(near_m: float, far_m: float, count: int) -> NDArray[np.float64]:
+def inverse_depth_planes(near_m: float, far_m: float, count: int) -> F64:
     """(count,) depths [m] from near to far, evenly spaced in inverse depth."""
     if not 0 < near_m < far_m:
         raise ValueError(f"depth range must be 0 < near < far, got {near_m} to {far_m}")
     return 1.0 / np.linspace(1.0 / near_m, 1.0 / far_m, count)
 
 
-def halved(image: NDArray[np.uint8]) -> NDArray[np.float32]:
+def halved(image: U8) -> F32:
     """The image averaged over 2 x 2 pixels, (height // 2, width // 2)."""
     height, width = (n // 2 * 2 for n in image.shape)
     blocks = image[:height, :width].astype(np.float32)
@@ -69,13 +71,11 @@ class TurnedView:
         valid: (2 * height, 2) int32: columns [lo, hi) of each row that the view covers.
     """
 
-    phases: NDArray[np.float32]
-    valid: NDArray[np.int32]
+    phases: F32
+    valid: I32
 
     @classmethod
-    def turn(
-        cls, image: NDArray[np.uint8], camera: PinholeCamera, R_view_reference: NDArray
-    ) -> TurnedView:
+    def turn(cls, image: U8, camera: PinholeCamera, R_view_reference: F64) -> TurnedView:
         """Turns a full-resolution image of `camera`."""
         matrix = camera.matrix()
         homography = matrix @ R_view_reference @ np.linalg.inv(matrix)
@@ -97,7 +97,7 @@ class TurnedView:
         return TurnedView(self.phases * factor.astype(np.float32)[None, :, None, :], self.valid)
 
 
-def _covered_columns(homography: NDArray, camera: PinholeCamera) -> NDArray[np.int32]:
+def _covered_columns(homography: F64, camera: PinholeCamera) -> I32:
     """(rows, 2) columns [lo, hi) where the 2 x 2 mean that starts there saw the image only.
 
     Pixel (x, y) falls on (q_x / q_z, q_y / q_z) with q linear in both: that this is a place in
@@ -130,9 +130,9 @@ class CostVolume:
         limits: One (height, planes, 2) int16 a view: the columns [lo, hi) that it covers.
     """
 
-    def __init__(self, costs: NDArray[np.uint16]) -> None:
+    def __init__(self, costs: U16) -> None:
         self.costs = costs
-        self.limits: list[NDArray[np.int16]] = []
+        self.limits: list[I16] = []
 
 
 class PlaneSweep:
@@ -153,10 +153,10 @@ class PlaneSweep:
 
     def __init__(
         self,
-        image: NDArray[np.uint8],
+        image: U8,
         camera: PinholeCamera,
         T_mav_camera: SE3,
-        depths: NDArray[np.float64],
+        depths: F64,
         parameters: Parameters,
         sides: int,
         workspace: Workspace | None = None,
@@ -182,7 +182,7 @@ class PlaneSweep:
             self.workspace.give(volume.costs)
         self.volumes = []
 
-    def add(self, image: NDArray[np.uint8], T_mav_camera: SE3, side: int) -> None:
+    def add(self, image: U8, T_mav_camera: SE3, side: int) -> None:
         """Compares one more view with the reference at every plane."""
         T_reference_view = self.T_mav_camera.inverse() @ T_mav_camera
         view = TurnedView.turn(image, self.full_camera, T_reference_view.rotation.T)
@@ -207,7 +207,7 @@ class PlaneSweep:
         )
         volume.limits.append(limits)
 
-    def _plane_maps(self, centre: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    def _plane_maps(self, centre: F64) -> tuple[F64, F64, F64, F64]:
         """Scale and shift from reference pixels to the view's half pixels, plane by plane.
 
         A point at depth z on the ray of column x is at depth z - c_z before the turned
@@ -219,7 +219,7 @@ class PlaneSweep:
         y_shift = camera.cy * (1 - scale) - camera.fy * centre[1] / (self.depths - centre[2])
         return 2 * scale, 2 * x_shift, 2 * scale, 2 * y_shift
 
-    def _gain(self, view: TurnedView, centre: NDArray) -> Gain:
+    def _gain(self, view: TurnedView, centre: F64) -> Gain:
         """What gives the view the reference's brightness, seen through the middle plane.
 
         The least-squares plane through the ratio of the two, blurred so much that depth
@@ -249,7 +249,7 @@ class PlaneSweep:
         return Gain(*gain)
 
 
-def _coarse(image: NDArray) -> NDArray:
+def _coarse(image: NDArray[Any]) -> NDArray[Any]:
     """Means over squares of the image, a few pixels apart."""
     begin, stride = GAIN_BLUR_PX // 2, GAIN_STRIDE_PX
     return cv2.blur(image, (GAIN_BLUR_PX, GAIN_BLUR_PX))[begin::stride, begin::stride]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from airground.core.arrays import F32, F64, I32, U8, U32
 from airground.core.cloud import PointCloud
 from airground.core.surface import DepthMap
 from airground.dense.distance_field import MAX_BINS
@@ -16,12 +16,12 @@ FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 def cast_surface(
     volume: Volume,
-    phi: NDArray[np.float32],
-    counts: NDArray[np.uint32],
+    phi: F32,
+    counts: U32,
     min_observations: int,
     truncation_m: float,
     bins: int = MAX_BINS,
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+) -> tuple[F32, F32]:
     """Depth and normals of the surface in the volume's own view.
 
     Args:
@@ -50,9 +50,7 @@ def cast_surface(
     return depth, normals
 
 
-def surface_cloud(
-    volume: Volume, depth: NDArray[np.float32], normals: NDArray[np.float32], reference: DepthMap
-) -> PointCloud:
+def surface_cloud(volume: Volume, depth: F32, normals: F32, reference: DepthMap) -> PointCloud:
     """The cast points in the MAV's map, with the grey values of the reference view."""
     camera, T_mav_camera = volume.camera, volume.T_mav_camera
     intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
@@ -70,13 +68,8 @@ def surface_cloud(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _seen_points(
-    depth: NDArray,
-    normals: NDArray,
-    image: NDArray,
-    intrinsics: NDArray,
-    rotation: NDArray,
-    translation: NDArray,
-) -> tuple[NDArray, NDArray, NDArray]:
+    depth: F32, normals: F32, image: U8, intrinsics: F64, rotation: F64, translation: F64
+) -> tuple[F32, U8, F32]:
     """(N, 3) float32 points, (N, 3) uint8 colours and (N, 3) float32 normals, row by row."""
     rows, columns = depth.shape
     fx, fy, cx, cy = intrinsics
@@ -113,14 +106,14 @@ def _sum_of_counts(word: np.uint32) -> np.uint32:
 
 @njit(cache=True, error_model="numpy")
 def _first_hits(
-    here: NDArray,
-    behind: NDArray,
-    word_here: NDArray,
-    word_behind: NDArray,
+    here: F32,
+    behind: F32,
+    word_here: U32,
+    word_behind: U32,
     near: np.uint32,
     votes: np.uint32,
     k: int,
-    hit: NDArray,
+    hit: I32,
 ) -> None:
     """Notes plane k where phi first falls below zero between it and the next, with support.
 
@@ -144,7 +137,7 @@ def _first_hits(
 
 
 @njit(cache=True, error_model="numpy")
-def _line_zero(column: NDArray, k: int, reach: int, crossing: float) -> float:
+def _line_zero(column: F32, k: int, reach: int, crossing: float) -> float:
     """Where the line fitted to phi around a crossing is zero, in planes behind plane k.
 
     Args:
@@ -173,15 +166,15 @@ def _line_zero(column: NDArray, k: int, reach: int, crossing: float) -> float:
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
 def scan(
-    phi: NDArray,
-    counts: NDArray,
-    plane_depths: NDArray,
-    intrinsics: NDArray,
+    phi: F32,
+    counts: U32,
+    plane_depths: F64,
+    intrinsics: F64,
     min_observations: int,
     reach: int,
     bins: int,
-    depth: NDArray,
-    normals: NDArray,
+    depth: F32,
+    normals: F32,
 ) -> None:
     """Finds in each column the first supported change of phi from positive to negative."""
     rows, planes, columns = phi.shape

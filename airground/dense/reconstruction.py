@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import Config
+from airground.core.arrays import U8, U32
 from airground.core.camera import PinholeCamera
 from airground.core.events import (
     DepthMapMade,
@@ -57,13 +57,13 @@ class DenseReconstruction:
         self._fusion = Fusion(
             config.fusion.data_weight, config.fusion.iterations, config.fusion.bins
         )
-        self._counts: NDArray[np.uint32] | None = None
+        self._counts: U32 | None = None
         self._newest_ns = 0
 
     def add(
         self,
         stamp_ns: int,
-        image: NDArray[np.uint8],
+        image: U8,
         T_mav_camera: SE3,
         depth_range: tuple[float, float] | None = None,
     ) -> Iterator[Event]:

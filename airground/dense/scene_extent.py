@@ -9,11 +9,13 @@ poses. Both ranges are joined, so that neither cuts the scene short.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from airground.core.arrays import F32, F64, U8, Mask
 from airground.core.camera import PinholeCamera
 from airground.dense.view_selection import PosedImage
 
@@ -66,9 +68,7 @@ def scene_extent(
     return Extent(nearest * (1 - MARGIN), farthest * (1 + MARGIN))
 
 
-def triangulated_depths(
-    reference: PosedImage, view: PosedImage, camera: PinholeCamera
-) -> NDArray[np.float64]:
+def triangulated_depths(reference: PosedImage, view: PosedImage, camera: PinholeCamera) -> F64:
     """(N,) depths in `reference` [m] of corners found again in `view`."""
     corners = cv2.goodFeaturesToTrack(reference.image, MAX_CORNERS, 0.005, 12)
     if corners is None:
@@ -80,7 +80,7 @@ def triangulated_depths(
     return _depths(reference, view, camera, corners[good, 0], there[good, 0])
 
 
-def _track(start: NDArray, end: NDArray, corners: NDArray) -> tuple[NDArray, NDArray[np.bool_]]:
+def _track(start: U8, end: U8, corners: NDArray[Any]) -> tuple[F32, Mask]:
     moved, status, _ = cv2.calcOpticalFlowPyrLK(  # type: ignore[call-overload]
         start, end, corners, None, winSize=(15, 15), maxLevel=4
     )
@@ -88,12 +88,8 @@ def _track(start: NDArray, end: NDArray, corners: NDArray) -> tuple[NDArray, NDA
 
 
 def _depths(
-    reference: PosedImage,
-    view: PosedImage,
-    camera: PinholeCamera,
-    here: NDArray,
-    there: NDArray,
-) -> NDArray[np.float64]:
+    reference: PosedImage, view: PosedImage, camera: PinholeCamera, here: F32, there: F32
+) -> F64:
     """Depths of matched pixels (N, 2) that hold to the epipolar line and have parallax.
 
     In the reference's axes, with rays r (here) and s (there) and the view's centre c:
@@ -115,4 +111,5 @@ def _depths(
         plane = np.cross(centre / baseline, rays)
         off = np.abs(np.einsum("ij,ij->i", plane, others)) / np.linalg.norm(plane, axis=1)
     good = (parallax * camera.fx > MIN_PARALLAX_PX) & (off * camera.fx < MAX_EPIPOLAR_ERROR_PX)
-    return depth[good & (depth > 0)]
+    result: F64 = depth[good & (depth > 0)]
+    return result

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
 from airground.config import PlaneSweep as Parameters
+from airground.core.arrays import F32, U16
 from airground.dense.aggregation import MEAN_SCALE
 from airground.dense.workspace import Workspace
 
@@ -26,12 +26,7 @@ _UNREACHABLE = np.uint16(30000)
 """Stands beside the first and the last plane."""
 
 
-def smooth(
-    mean: NDArray[np.uint16],
-    reference: NDArray[np.float32],
-    parameters: Parameters,
-    workspace: Workspace,
-) -> NDArray[np.uint16]:
+def smooth(mean: U16, reference: F32, parameters: Parameters, workspace: Workspace) -> U16:
     """Sum over four directions of the costs of the cheapest path that ends at each pixel.
 
     Args:
@@ -55,9 +50,7 @@ def smooth(
 
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy")
-def jump_penalties(
-    image: NDArray, step: int, jump: float, edge: float, across: NDArray, down: NDArray
-) -> None:
+def jump_penalties(image: F32, step: int, jump: float, edge: float, across: U16, down: U16) -> None:
     """Fills (height, width) `across` and `down`: between a pixel and the one left of or above it.
 
     The jump penalty is lower across an edge of the image, and never below `step`.
@@ -72,13 +65,7 @@ def jump_penalties(
 
 @njit(cache=True, inline="always", error_model="numpy")
 def _extend(
-    cost: NDArray,
-    before: NDArray,
-    after: NDArray,
-    total: NDArray,
-    lowest: np.uint16,
-    step: int,
-    jump: np.uint16,
+    cost: U16, before: U16, after: U16, total: U16, lowest: np.uint16, step: int, jump: np.uint16
 ) -> np.uint16:
     """One pixel of one path; `before` and `after` have one guard at either end.
 
@@ -104,7 +91,7 @@ def _extend(
 
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
-def along_rows(mean: NDArray, across: NDArray, step: int, total: NDArray) -> None:
+def along_rows(mean: U16, across: U16, step: int, total: U16) -> None:
     """The sum of the paths from the left and from the right."""
     height, width, planes = mean.shape
     for task in prange((height + ROWS_AT_A_TIME - 1) // ROWS_AT_A_TIME):
@@ -135,7 +122,7 @@ def along_rows(mean: NDArray, across: NDArray, step: int, total: NDArray) -> Non
 
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
-def along_columns(mean: NDArray, down: NDArray, step: int, total: NDArray) -> None:
+def along_columns(mean: U16, down: U16, step: int, total: U16) -> None:
     """Adds the paths from the top and from the bottom."""
     height, width, planes = mean.shape
     for strip in prange(STRIPS):

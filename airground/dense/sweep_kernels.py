@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
+
+from airground.core.arrays import F32, F64, I16, I32, U16
 
 FAST = {"contract", "reassoc", "arcp", "nsz"}
 COST_SCALE = 16.0
@@ -19,7 +20,7 @@ MAX_RUNS = 64
 
 
 @njit(cache=True, error_model="numpy")
-def plan_columns(scale: NDArray, shift: NDArray, width: int) -> tuple[NDArray, NDArray, NDArray]:
+def plan_columns(scale: F64, shift: F64, width: int) -> tuple[I32, I32, F32]:
     """Where the columns of the reference fall in a view, plane by plane, as gather-free runs.
 
     Column x falls on `scale * x + shift` (in half columns, see `ViewImage`). Over a run,
@@ -51,17 +52,17 @@ def plan_columns(scale: NDArray, shift: NDArray, width: int) -> tuple[NDArray, N
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
 def add_view(
-    costs: NDArray,
+    costs: U16,
     first_view: bool,
-    limits: NDArray,
-    reference: NDArray,
-    phases: NDArray,
-    valid: NDArray,
-    row_scale: NDArray,
-    row_shift: NDArray,
-    starts: NDArray,
-    offsets: NDArray,
-    fractions: NDArray,
+    limits: I16,
+    reference: F32,
+    phases: F32,
+    valid: I32,
+    row_scale: F64,
+    row_shift: F64,
+    starts: I32,
+    offsets: I32,
+    fractions: F32,
     truncation: float,
 ) -> None:
     """Adds one view's truncated absolute differences to the cost volume.

@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import ViewSelection as Parameters
+from airground.core.arrays import U8
 from airground.core.se3 import SE3
 
 BEFORE, AFTER = 0, 1
@@ -29,7 +29,7 @@ class PosedImage:
     """
 
     stamp_ns: int
-    image: NDArray[np.uint8]
+    image: U8
     T_mav_camera: SE3
 
     def distance(self, other: PosedImage) -> float:

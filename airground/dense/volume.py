@@ -13,8 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.core.surface import DepthMap
@@ -82,7 +82,7 @@ class Volume:
         """Rows, planes, columns."""
         return self.camera.height, self.planes, self.camera.width
 
-    def depths(self) -> NDArray[np.float64]:
+    def depths(self) -> F64:
         """(planes,) depth of each plane [m]."""
         return np.linspace(self.near_m, self.far_m, self.planes)
 

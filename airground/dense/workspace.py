@@ -7,22 +7,23 @@ for the first time, takes longer than aggregating it.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from airground.core.arrays import U16
 
 
 class Workspace:
     """Arrays of uint16 that nobody uses at the moment."""
 
     def __init__(self) -> None:
-        self._free: list[NDArray[np.uint16]] = []
+        self._free: list[U16] = []
 
-    def take(self, shape: tuple[int, ...]) -> NDArray[np.uint16]:
+    def take(self, shape: tuple[int, ...]) -> U16:
         """A contiguous array with anything in it, not zeros."""
         for index, array in enumerate(self._free):
             if array.size == np.prod(shape):
                 return self._free.pop(index).reshape(shape)
         return np.empty(shape, np.uint16)
 
-    def give(self, array: NDArray[np.uint16]) -> None:
+    def give(self, array: U16) -> None:
         """Hand an array back; whoever does must not use it again."""
         self._free.append(array)

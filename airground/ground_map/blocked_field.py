@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import open3d as o3d
-from numpy.typing import NDArray
+
+from airground.core.arrays import F32, I32
 
 ATTRIBUTES = ("tsdf", "weight", "color")
 """What a voxel holds, as Open3D calls it."""
@@ -46,11 +47,11 @@ class BlockedField:
         voxel_m: Side of a voxel [m].
     """
 
-    places: NDArray[np.int32]
-    rows: NDArray[np.int32]
-    tsdf: NDArray[np.float32]
-    weight: NDArray[np.float32]
-    colour: NDArray[np.float32]
+    places: I32
+    rows: I32
+    tsdf: F32
+    weight: F32
+    colour: F32
     voxel_m: float
 
     @classmethod

@@ -15,9 +15,9 @@ from contextlib import closing
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import GroundMapping
+from airground.core.arrays import F32, U8
 from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
 from airground.core.messages import GroundImage
@@ -127,9 +127,7 @@ class GroundMap:
             for keyframe, images in zip(waiting, unpacked, strict=True):
                 self._fuse(keyframe, *images)
 
-    def _fuse(
-        self, keyframe: GroundKeyframe, depth: NDArray[np.float32], colour: NDArray[np.uint8]
-    ) -> None:
+    def _fuse(self, keyframe: GroundKeyframe, depth: F32, colour: U8) -> None:
         """Put a keyframe's images into the distance field."""
         self._fused += 1
         config, pose = self._config, keyframe.T_ground_camera

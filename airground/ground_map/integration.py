@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 import open3d as o3d
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from airground.core.arrays import F32, I32, U8
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.ground_map.blocked_field import ATTRIBUTES, BLOCK, COLOUR_SCALE
@@ -23,9 +23,9 @@ ONE, HALF, SCALE = np.float32(1.0), np.float32(0.5), np.float32(COLOUR_SCALE)
 
 def integrate(
     grid: o3d.t.geometry.VoxelBlockGrid,
-    blocks: NDArray[np.int32],
-    depth: NDArray[np.float32],
-    colour: NDArray[np.uint8],
+    blocks: I32,
+    depth: F32,
+    colour: U8,
     camera: PinholeCamera,
     T_map_camera: SE3,
     voxel_m: float,
@@ -65,15 +65,15 @@ def integrate(
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy")
 def add_view(
-    places: NDArray[np.int32],
-    rows: NDArray[np.int32],
-    depth: NDArray[np.float32],
-    colour: NDArray[np.uint8],
-    pinhole: NDArray[np.float32],
-    T_camera_map: NDArray[np.float32],
+    places: I32,
+    rows: I32,
+    depth: F32,
+    colour: U8,
+    pinhole: F32,
+    T_camera_map: F32,
     voxel_m: np.float32,
     truncation_m: np.float32,
-    field: tuple[NDArray, NDArray, NDArray],
+    field: tuple[F32, F32, F32],
 ) -> None:
     """`integrate` on arrays.
 
@@ -103,16 +103,16 @@ def add_view(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _add_to_block(
-    place: NDArray,
-    depth: NDArray,
-    colour: NDArray,
-    pinhole: NDArray,
-    T_camera_map: NDArray,
+    place: I32,
+    depth: F32,
+    colour: U8,
+    pinhole: F32,
+    T_camera_map: F32,
     voxel_m: np.float32,
     truncation_m: np.float32,
-    tsdf: NDArray,
-    weight: NDArray,
-    colours: NDArray,
+    tsdf: F32,
+    weight: F32,
+    colours: F32,
 ) -> None:
     fx, fy, cx, cy = pinhole
     r00, r01, r02, t0 = T_camera_map[0]
@@ -139,13 +139,13 @@ def _add_to_block(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _add_to_line(
-    line: NDArray,
-    depth: NDArray,
-    colour: NDArray,
+    line: F32,
+    depth: F32,
+    colour: U8,
     truncation_m: np.float32,
-    tsdf: NDArray,
-    weight: NDArray,
-    colours: NDArray,
+    tsdf: F32,
+    weight: F32,
+    colours: F32,
 ) -> None:
     height, width = np.float32(depth.shape[0]), np.float32(depth.shape[1])
     column, row, along = line

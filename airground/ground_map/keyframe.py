@@ -8,8 +8,8 @@ import cv2
 import numpy as np
 from isal import isal_zlib
 from numba import njit
-from numpy.typing import NDArray
 
+from airground.core.arrays import F32, U8, U16
 from airground.core.messages import GroundImage
 from airground.core.se3 import SE3
 
@@ -58,16 +58,16 @@ class GroundKeyframe:
             levels.shape,
         )
 
-    def unpack(self) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
+    def unpack(self) -> tuple[F32, U8]:
         """`depth` and `colour`."""
         return self.depth(), self.colour()
 
-    def depth(self) -> NDArray[np.float32]:
+    def depth(self) -> F32:
         """(height, width) [m], 0 where missing."""
         levels = np.frombuffer(isal_zlib.decompress(self.packed_depth), np.uint16)
         return levels.reshape(self.shape) * np.float32(self.step_m)
 
-    def colour(self) -> NDArray[np.uint8]:
+    def colour(self) -> U8:
         """(height, width, 3) RGB."""
         bgr = cv2.imdecode(np.frombuffer(self.packed_colour, np.uint8), cv2.IMREAD_COLOR)
         assert bgr is not None
@@ -75,9 +75,7 @@ class GroundKeyframe:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def usable_levels(
-    depth: NDArray[np.float32], max_depth_m: np.float32, step_m: np.float32
-) -> NDArray[np.uint16]:
+def usable_levels(depth: F32, max_depth_m: np.float32, step_m: np.float32) -> U16:
     """Depth in steps, 0 where there is none to use.
 
     Beside a jump in depth the sensor mixes fore- and background: pixels on both sides are left

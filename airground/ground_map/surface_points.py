@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from airground.core.arrays import F32, I32, I64, U8
 from airground.core.cloud import PointCloud
 from airground.ground_map.blocked_field import BLOCK, COLOUR_SCALE, BlockedField
 
@@ -46,7 +46,7 @@ def surface_points(field: BlockedField, min_weight: float) -> PointCloud:
 
 
 @njit(cache=True, parallel=True, nogil=True)
-def neighbours(words: NDArray[np.int64]) -> NDArray[np.int32]:
+def neighbours(words: I64) -> I32:
     """(N, 27) index of each block's neighbours (itself in the middle), -1 where there is none.
 
     Args:
@@ -76,12 +76,7 @@ def _range_of(step: int) -> tuple[int, int, int]:
 
 
 @njit(cache=True)
-def _surround(
-    values: NDArray[np.float32],
-    rows: NDArray[np.int32],
-    near: NDArray[np.int32],
-    cube: NDArray[np.float32],
-) -> None:
+def _surround(values: F32, rows: I32, near: I32, cube: F32) -> None:
     """A block's voxels with some of those around it, NaN where no block is.
 
     Args:
@@ -106,9 +101,7 @@ def _surround(
 
 
 @njit(cache=True)
-def _take_known(
-    tsdf: NDArray[np.float32], weight: NDArray[np.float32], min_weight: np.float32, out: NDArray
-) -> None:
+def _take_known(tsdf: F32, weight: F32, min_weight: np.float32, out: F32) -> None:
     """Values of voxels (K,), NaN where they are unknown."""
     for i in range(len(out)):
         out[i] = tsdf[i] if weight[i] > min_weight else np.float32(np.nan)
@@ -122,12 +115,8 @@ def _changes_sign(here: np.float32, there: np.float32) -> np.uint8:
 
 @njit(cache=True, parallel=True, nogil=True)
 def find_crossings(
-    tsdf: NDArray[np.float32],
-    weight: NDArray[np.float32],
-    rows: NDArray[np.int32],
-    beside: NDArray[np.int32],
-    min_weight: np.float32,
-) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+    tsdf: F32, weight: F32, rows: I32, beside: I32, min_weight: np.float32
+) -> tuple[U8, I64]:
     """Which edges between known voxels change their sign.
 
     Args:
@@ -174,7 +163,7 @@ def find_crossings(
 
 
 @njit(cache=True)
-def _difference(cube: NDArray[np.float32], x: int, y: int, z: int, axis: int) -> np.float32:
+def _difference(cube: F32, x: int, y: int, z: int, axis: int) -> np.float32:
     """Central difference of the field at a voxel, 0 where a side is in no block."""
     i, j, k = int(axis == 0), int(axis == 1), int(axis == 2)
     value = cube[z + k, y + j, x + i] - cube[z - k, y - j, x - i]
@@ -183,7 +172,7 @@ def _difference(cube: NDArray[np.float32], x: int, y: int, z: int, axis: int) ->
 
 @njit(cache=True, error_model="numpy")
 def _crossing(
-    cube: NDArray[np.float32], x: int, y: int, z: int, axis: int
+    cube: F32, x: int, y: int, z: int, axis: int
 ) -> tuple[np.float32, tuple[np.float32, np.float32, np.float32]]:
     """Where an edge crosses the zero level, and the gradient there, both linear along the edge.
 
@@ -207,14 +196,8 @@ def _crossing(
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy")
 def place_points(
-    tsdf: NDArray[np.float32],
-    colour: NDArray[np.float32],
-    places: NDArray[np.int32],
-    rows: NDArray[np.int32],
-    beside: NDArray[np.int32],
-    crossed: NDArray[np.uint8],
-    first: NDArray[np.int64],
-) -> tuple[NDArray[np.float32], NDArray[np.uint8], NDArray[np.float32]]:
+    tsdf: F32, colour: F32, places: I32, rows: I32, beside: I32, crossed: U8, first: I64
+) -> tuple[F32, U8, F32]:
     """The points (M, 3) float32 [voxels], colours (M, 3) uint8, unit normals (M, 3) float32.
 
     Args:

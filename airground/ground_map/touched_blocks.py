@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from airground.core.arrays import F32, I32
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 
@@ -20,13 +20,13 @@ STEPS = 3
 
 
 def touched_blocks(
-    depth: NDArray[np.float32],
+    depth: F32,
     camera: PinholeCamera,
     T_map_camera: SE3,
     block_m: float,
     truncation_m: float,
     max_depth_m: float,
-) -> NDArray[np.int32]:
+) -> I32:
     """Blocks that a truncated signed distance field needs for a view.
 
     Args:
@@ -54,13 +54,13 @@ def touched_blocks(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def blocks_along_rays(
-    depth: NDArray[np.float32],
-    inverse: NDArray[np.float32],
-    T_map_camera: NDArray[np.float32],
+    depth: F32,
+    inverse: F32,
+    T_map_camera: F32,
     block_m: np.float32,
     truncation_m: np.float32,
     max_depth_m: np.float32,
-) -> tuple[NDArray[np.int32], int]:
+) -> tuple[I32, int]:
     """The blocks of points on both sides of what each pixel measured, one after another.
 
     Args:
@@ -103,7 +103,7 @@ def blocks_along_rays(
 
 
 @njit(cache=True, nogil=True)
-def unique_blocks(blocks: NDArray[np.int32]) -> NDArray[np.int32]:
+def unique_blocks(blocks: I32) -> I32:
     """(N, 3) of (M, 3): each once, sorted, as `np.unique` along the first axis."""
     if len(blocks) == 0:
         return np.empty((0, 3), np.int32)

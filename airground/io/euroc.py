@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64, I64
 from airground.core.messages import ImuSamples, MagneticSamples
 from airground.core.se3 import SE3
 from airground.errors import RecordingError
@@ -45,7 +45,7 @@ def write_magnetic(path: Path, samples: MagneticSamples) -> None:
     _write_samples(path, MAGNETIC_COLUMNS, samples.stamps_ns, samples.field)
 
 
-def read_image_list(path: Path) -> tuple[NDArray[np.int64], list[str]]:
+def read_image_list(path: Path) -> tuple[I64, list[str]]:
     """Stamps (N,) [ns] and file names of a camera's images.
 
     Raises:
@@ -69,7 +69,7 @@ def read_image_list(path: Path) -> tuple[NDArray[np.int64], list[str]]:
     return array, names
 
 
-def write_image_list(path: Path, stamps_ns: NDArray[np.int64], names: list[str]) -> None:
+def write_image_list(path: Path, stamps_ns: I64, names: list[str]) -> None:
     lines = [f"{stamp},{name}" for stamp, name in zip(stamps_ns, names, strict=True)]
     path.write_text("\n".join([CAMERA_COLUMNS, *lines]) + "\n", encoding="utf-8")
 
@@ -96,7 +96,7 @@ def _pose_yaml(pose: SE3) -> str:
     return f"T_BS:\n  cols: 4\n  rows: 4\n  data: [{numbers}]\n"
 
 
-def _read_samples(path: Path, columns: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _read_samples(path: Path, columns: int) -> tuple[I64, F64]:
     """(N,) stamps and (N, columns) values, all finite, in strict order of time."""
     for number, line in enumerate(read_lines(path), start=1):
         if line and not line.startswith("#"):
@@ -128,7 +128,7 @@ def _check_whole_stamp(line: str, number: int, path: Path) -> None:
         )
 
 
-def _write_samples(path: Path, columns: str, stamps: NDArray, values: NDArray) -> None:
+def _write_samples(path: Path, columns: str, stamps: I64, values: F64) -> None:
     rows = zip(stamps.tolist(), values.tolist(), strict=True)
     lines = [f"{stamp}," + ",".join(map(repr, row)) for stamp, row in rows]
     path.write_text("\n".join([columns, *lines]) + "\n", encoding="utf-8")
@@ -144,7 +144,7 @@ def read_lines(path: Path) -> list[str]:
         raise RecordingError(f"{path}: cannot be read as text: {error}") from None
 
 
-def check_stamps(stamps: NDArray[np.int64], path: Path) -> None:
+def check_stamps(stamps: I64, path: Path) -> None:
     """RecordingError unless there is a stamp and all strictly increase."""
     if len(stamps) == 0:
         raise RecordingError(f"{path}: holds no entry")

@@ -7,9 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from airground.core.arrays import F32, U8
 from airground.core.camera import PinholeCamera
 from airground.errors import RecordingError
 from airground.io.images import read_colour, read_depth, read_grey
@@ -18,11 +16,11 @@ from airground.io.images import read_colour, read_depth, read_grey
 class ImageSource(Protocol):
     """Gives the images of both robots by their index in the recording's stamps."""
 
-    def mav(self, index: int) -> NDArray[np.uint8]:
+    def mav(self, index: int) -> U8:
         """(height, width) grey."""
         ...
 
-    def ground(self, index: int) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    def ground(self, index: int) -> tuple[U8, F32]:
         """(height, width, 3) RGB and (height, width) depth [m], NaN where missing."""
         ...
 
@@ -44,10 +42,10 @@ class ImageFiles:
     ground_camera: PinholeCamera
     depth_units_per_m: float
 
-    def mav(self, index: int) -> NDArray[np.uint8]:
+    def mav(self, index: int) -> U8:
         return read_grey(self.mav_files[index], self.mav_camera.width, self.mav_camera.height)
 
-    def ground(self, index: int) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+    def ground(self, index: int) -> tuple[U8, F32]:
         size = self.ground_camera.width, self.ground_camera.height
         return (
             read_colour(self.ground_colour_files[index], *size),

@@ -3,34 +3,36 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from airground.core.arrays import F32, U8, U16, Scalar
 from airground.errors import RecordingError
 from airground.io.png import SIGNATURE, PngHeader, decode_png, warm_up_decoding
 
 _PNG_END = b"IEND\xaeB`\x82"
 
 
-def read_grey(path: Path, width: int, height: int) -> NDArray[np.uint8]:
+def read_grey(path: Path, width: int, height: int) -> U8:
     """(height, width) uint8; raises RecordingError naming the file."""
     return _read(path, (height, width), np.uint8)
 
 
-def read_colour(path: Path, width: int, height: int) -> NDArray[np.uint8]:
+def read_colour(path: Path, width: int, height: int) -> U8:
     """(height, width, 3) uint8 RGB; raises RecordingError naming the file."""
     return _read(path, (height, width, 3), np.uint8)
 
 
-def read_depth(path: Path, width: int, height: int, units_per_m: float) -> NDArray[np.float32]:
+def read_depth(path: Path, width: int, height: int, units_per_m: float) -> F32:
     """(height, width) float32 [m], NaN where the file holds 0; raises RecordingError."""
     return metric_depth(_read(path, (height, width), np.uint16), units_per_m)
 
 
-def metric_depth(units: NDArray[np.uint16], units_per_m: float) -> NDArray[np.float32]:
+def metric_depth(units: U16, units_per_m: float) -> F32:
     """Depth [m] from the values of a depth image; NaN for 0."""
     depth = np.empty(units.shape, np.float32)
     _to_metres(np.ascontiguousarray(units).reshape(-1), np.float32(units_per_m), depth.reshape(-1))
@@ -44,7 +46,7 @@ def warm_up_images() -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _to_metres(units: NDArray, units_per_m: np.float32, depth: NDArray) -> None:
+def _to_metres(units: U16, units_per_m: np.float32, depth: F32) -> None:
     for i in range(len(units)):
         depth[i] = np.float32(units[i]) / units_per_m if units[i] > 0 else np.float32(np.nan)
 
@@ -70,7 +72,7 @@ def _bytes(path: Path) -> bytes:
     return data
 
 
-def _read(path: Path, shape: tuple[int, ...], dtype: type[np.generic]) -> NDArray:
+def _read(path: Path, shape: tuple[int, ...], dtype: type[Scalar]) -> NDArray[Scalar]:
     data = _bytes(path)
     if not data.endswith(_PNG_END):
         raise RecordingError(f"{path}: is truncated: the PNG image has no end")
@@ -94,7 +96,7 @@ def _read(path: Path, shape: tuple[int, ...], dtype: type[np.generic]) -> NDArra
     return image
 
 
-def _decode_any(data: bytes) -> NDArray:
+def _decode_any(data: bytes) -> NDArray[Any]:
     """The image in a PNG file of any kind; ValueError if it is damaged."""
     image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if image is None:

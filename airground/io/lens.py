@@ -8,11 +8,13 @@ look like structure to a tracker. A lens without distortion leaves images as the
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from airground.core.arrays import F32, F64, U8
 from airground.core.camera import PinholeCamera
 
 
@@ -31,7 +33,7 @@ class Lens:
     intrinsics: tuple[float, float, float, float]
     distortion: tuple[float, ...]
 
-    def matrix(self) -> NDArray[np.float64]:
+    def matrix(self) -> F64:
         """The (3, 3) intrinsic matrix."""
         fx, fy, cx, cy = self.intrinsics
         return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
@@ -45,8 +47,8 @@ class Undistortion:
     """
 
     def __init__(self, lens: Lens) -> None:
-        self._maps: tuple[NDArray, NDArray] | None = None
-        self._nearest: NDArray | None = None
+        self._maps: tuple[NDArray[Any], NDArray[Any]] | None = None
+        self._nearest: NDArray[Any] | None = None
         size = (lens.width, lens.height)
         matrix = original = lens.matrix()
         if any(lens.distortion):
@@ -66,13 +68,13 @@ class Undistortion:
             cy=float(matrix[1, 2]),
         )
 
-    def image(self, image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    def image(self, image: U8) -> U8:
         """Grey (H, W) or colour (H, W, 3), interpolated."""
         if self._maps is None:
             return image
         return np.asarray(cv2.remap(image, *self._maps, cv2.INTER_LINEAR), np.uint8)
 
-    def depth(self, depth: NDArray[np.float32]) -> NDArray[np.float32]:
+    def depth(self, depth: F32) -> F32:
         """(H, W) [m]; nearest pixel, so that neither edges nor holes (NaN) are blurred.
 
         Depth along the optical axis is the same in both cameras: their axes coincide.

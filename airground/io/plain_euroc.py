@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64, I64
 from airground.core.cloud import Source
 from airground.core.messages import ImuNoise, ImuSamples, MavImage, RobotCalibration
 from airground.core.se3 import SE3
@@ -113,12 +113,10 @@ class Inertial:
     samples: ImuSamples
     noise: ImuNoise
     T_imu_camera: SE3
-    up_imu: NDArray[np.float64]
+    up_imu: F64
 
 
-def read_inertial(
-    folder: Path, T_body_camera: SE3, camera_stamps_ns: NDArray[np.int64]
-) -> Inertial:
+def read_inertial(folder: Path, T_body_camera: SE3, camera_stamps_ns: I64) -> Inertial:
     """Read `imu0`, and check that it fits the images.
 
     Args:

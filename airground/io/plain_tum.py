@@ -18,8 +18,8 @@ from typing import Any
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64, I64, U8
 from airground.core.cloud import Source
 from airground.core.messages import GroundImage, MavImage, RobotCalibration
 from airground.core.se3 import SE3
@@ -58,9 +58,7 @@ START_S = 0.1
 """Accelerometer readings this close to the first image give the direction of gravity [s]."""
 
 
-def associate(
-    first_ns: NDArray[np.int64], second_ns: NDArray[np.int64], max_difference_ns: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def associate(first_ns: I64, second_ns: I64, max_difference_ns: int) -> tuple[I64, I64]:
     """Pair stamps one to one, the nearest pairs first (as TUM's `associate.py` does).
 
     Args:
@@ -167,9 +165,7 @@ def open_tum(
     )
 
 
-def _inertial(
-    path: Path, calibration_file: Path | None, stamps: NDArray[np.int64]
-) -> Inertial | None:
+def _inertial(path: Path, calibration_file: Path | None, stamps: I64) -> Inertial | None:
     """The IMU of a folder that has one; the camera's calibration gives its pose."""
     if not (path / "imu0").exists():
         return None
@@ -207,13 +203,13 @@ def _published_lens(path: Path) -> Lens:
     )
 
 
-def _image_list(path: Path) -> tuple[NDArray[np.int64], list[str]]:
+def _image_list(path: Path) -> tuple[I64, list[str]]:
     stamps, names = read_image_list(path)
     check_stamp_unit(stamps, path, "seconds", CAMERA_STEP_S)
     return stamps, names
 
 
-def _check_same_size(depth_file: Path, colour: NDArray[np.uint8]) -> None:
+def _check_same_size(depth_file: Path, colour: U8) -> None:
     width, height = image_size(depth_file)
     if (height, width) != colour.shape[:2]:
         raise RecordingError(
@@ -223,7 +219,7 @@ def _check_same_size(depth_file: Path, colour: NDArray[np.uint8]) -> None:
         )
 
 
-def _up_at_start(path: Path, stamp_ns: int) -> NDArray[np.float64]:
+def _up_at_start(path: Path, stamp_ns: int) -> F64:
     """(3,) unit vector against gravity in the camera at the first image."""
     file = path / "accelerometer.txt"
     if not file.is_file():

@@ -8,8 +8,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from airground.core.arrays import F64, I64
 from airground.core.messages import ImuSamples
 from airground.core.se3 import SE3, nearest_rotation
 from airground.errors import RecordingError
@@ -34,9 +35,7 @@ UPSIDE_DOWN = -0.3
 _UNITS_NS = {"nanoseconds": 1, "microseconds": 10**3, "milliseconds": 10**6, "seconds": 10**9}
 
 
-def check_stamp_unit(
-    stamps_ns: NDArray[np.int64], path: Path, unit: str, steps_s: tuple[float, float]
-) -> None:
+def check_stamp_unit(stamps_ns: I64, path: Path, unit: str, steps_s: tuple[float, float]) -> None:
     """RecordingError if the stamps tick as if they were written in another unit than `unit`.
 
     Args:
@@ -65,7 +64,7 @@ def check_stamp_unit(
 
 
 def check_imu_covers(
-    imu: ImuSamples, imu_path: Path, camera_stamps_ns: NDArray[np.int64], offset_ns: int = 0
+    imu: ImuSamples, imu_path: Path, camera_stamps_ns: I64, offset_ns: int = 0
 ) -> None:
     """RecordingError unless inertial samples reach from the first image to the last.
 
@@ -78,13 +77,7 @@ def check_imu_covers(
     first, last = int(camera_stamps_ns[0]) + offset_ns, int(camera_stamps_ns[-1]) + offset_ns
     late_s = (int(imu.stamps_ns[0]) - first) / 1e9
     early_s = (last - int(imu.stamps_ns[-1])) / 1e9
-    for missing_s, where in (
-        (
-            late_s,
-            "begins",
-        ),
-        (early_s, "ends"),
-    ):
+    for missing_s, where in ((late_s, "begins"), (early_s, "ends")):
         if missing_s > IMU_SLACK_S:
             side = "after the first" if where == "begins" else "before the last"
             raise RecordingError(
@@ -93,7 +86,7 @@ def check_imu_covers(
             )
 
 
-def upwards(imu: ImuSamples, imu_path: Path) -> NDArray[np.float64]:
+def upwards(imu: ImuSamples, imu_path: Path) -> F64:
     """(3,) unit vector that points up in the IMU as the recording starts.
 
     Raises:
@@ -108,10 +101,11 @@ def upwards(imu: ImuSamples, imu_path: Path) -> NDArray[np.float64]:
         )
     start = imu.stamps_ns <= imu.stamps_ns[0] + round(START_S * 1e9)
     mean = imu.accelerometer[start].mean(axis=0)
-    return mean / np.linalg.norm(mean)
+    result: F64 = mean / np.linalg.norm(mean)
+    return result
 
 
-def check_up_in_camera(up_camera: NDArray[np.float64], imu_path: Path) -> None:
+def check_up_in_camera(up_camera: F64, imu_path: Path) -> None:
     """RecordingError if gravity has the wrong sign for a camera that looks ahead or down.
 
     However it is pitched between straight ahead and straight down, up in the image's axes
@@ -125,7 +119,7 @@ def check_up_in_camera(up_camera: NDArray[np.float64], imu_path: Path) -> None:
         )
 
 
-def check_up_in_body(up_body: NDArray[np.float64], imu_path: Path) -> None:
+def check_up_in_body(up_body: F64, imu_path: Path) -> None:
     """RecordingError if gravity has the wrong sign for a body whose z axis points up."""
     if up_body[2] < UPSIDE_DOWN:
         raise RecordingError(
@@ -155,7 +149,7 @@ def rigid(numbers: ArrayLike, path: Path, key: str) -> SE3:
     return SE3(rotation, matrix[:3, 3])
 
 
-def level_body(up_imu: NDArray[np.float64], T_imu_camera: SE3) -> SE3:
+def level_body(up_imu: F64, T_imu_camera: SE3) -> SE3:
     """T_body_imu of a body at the IMU: z up as given, x where the camera looks, levelled.
 
     Plain folders do not say how their sensors sit in a body with z up; where the camera

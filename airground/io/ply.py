@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from airground.core.arrays import U8
 from airground.core.cloud import PointCloud
 from airground.errors import InputError
 
@@ -17,12 +19,12 @@ _SOURCE = [("source", "u1")]
 _PLY_TYPES = {"<f4": "float", "u1": "uchar"}
 
 
-def write_ply(path: Path, cloud: PointCloud, sources: NDArray[np.uint8] | None = None) -> None:
+def write_ply(path: Path, cloud: PointCloud, sources: U8 | None = None) -> None:
     """Write a cloud; `sources` (N,) becomes the property `source` that viewers ignore."""
     fields = _POSITION + (_NORMAL if cloud.normals is not None else []) + _COLOUR
     fields = fields + (_SOURCE if sources is not None else [])
     table = np.zeros(len(cloud), np.dtype(fields))
-    columns: list[tuple[list[tuple[str, str]], NDArray]]
+    columns: list[tuple[list[tuple[str, str]], NDArray[Any]]]
     columns = [(_POSITION, cloud.points), (_COLOUR, cloud.colours)]
     if cloud.normals is not None:
         columns.append((_NORMAL, cloud.normals))
@@ -39,7 +41,7 @@ def write_ply(path: Path, cloud: PointCloud, sources: NDArray[np.uint8] | None =
     path.write_bytes(text.encode("ascii") + table.tobytes())
 
 
-def read_ply(path: Path) -> tuple[PointCloud, NDArray[np.uint8] | None]:
+def read_ply(path: Path) -> tuple[PointCloud, U8 | None]:
     """Read what `write_ply` wrote: the cloud, and the sources if they are in the file.
 
     Raises:
@@ -69,7 +71,7 @@ def read_ply(path: Path) -> tuple[PointCloud, NDArray[np.uint8] | None]:
     return cloud, sources
 
 
-def _parse_header(path: Path, header: str) -> tuple[int, np.dtype]:
+def _parse_header(path: Path, header: str) -> tuple[int, np.dtype[np.void]]:
     """Number of points and the type of one."""
     kinds = {ply: kind for kind, ply in _PLY_TYPES.items()}
     count: int | None = None
@@ -91,5 +93,5 @@ def _parse_header(path: Path, header: str) -> tuple[int, np.dtype]:
     return count, np.dtype(fields)
 
 
-def _columns(table: NDArray, fields: list[tuple[str, str]]) -> NDArray:
+def _columns(table: NDArray[Any], fields: list[tuple[str, str]]) -> NDArray[Any]:
     return np.stack([table[name] for name, _ in fields], axis=1)

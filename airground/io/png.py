@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from isal import isal_zlib
 from numba import njit
 from numpy.typing import NDArray
+
+from airground.core.arrays import U8
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _GREY, _RGB = 0, 2
@@ -49,7 +52,7 @@ class PngHeader:
         return self.width * self.pixel_bytes
 
 
-def decode_png(data: bytes) -> NDArray:
+def decode_png(data: bytes) -> NDArray[Any]:
     """The image in a PNG file.
 
     Returns:
@@ -97,7 +100,7 @@ def _image_data(data: bytes) -> bytes:
 
 
 @njit(cache=True, nogil=True)
-def undo_filters(filtered: NDArray, rows: NDArray, pixel_bytes: int) -> bool:
+def undo_filters(filtered: U8, rows: U8, pixel_bytes: int) -> bool:
     """Undo what was subtracted from each byte before it was compressed (PNG specification, 9).
 
     Args:
@@ -125,7 +128,7 @@ def undo_filters(filtered: NDArray, rows: NDArray, pixel_bytes: int) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _add_left(line: NDArray, row: NDArray, pixel_bytes: int) -> None:
+def _add_left(line: U8, row: U8, pixel_bytes: int) -> None:
     """Filter 1, which our recordings use throughout: sums of as many channels side by side."""
     if pixel_bytes == 3:
         red = green = blue = 0
@@ -145,14 +148,14 @@ def _add_left(line: NDArray, row: NDArray, pixel_bytes: int) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _add_above(line: NDArray, above: NDArray, row: NDArray) -> None:
+def _add_above(line: U8, above: U8, row: U8) -> None:
     """Filter 2."""
     for x in range(len(row)):
         row[x] = (line[x] + above[x]) & 255
 
 
 @njit(cache=True, nogil=True)
-def _add_guess(line: NDArray, above: NDArray, row: NDArray, pixel_bytes: int, mean: bool) -> None:
+def _add_guess(line: U8, above: U8, row: U8, pixel_bytes: int, mean: bool) -> None:
     """Filters 3, the mean of left and above, and 4, the nearest of left, above and corner."""
     for channel in range(pixel_bytes):
         left, corner = 0, 0

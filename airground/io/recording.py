@@ -6,9 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from airground.core.arrays import I64
 from airground.core.cloud import Source
 from airground.core.messages import GroundImage, MavImage
 from airground.errors import RecordingError
@@ -158,11 +156,7 @@ class Recording(Pair):
 
 
 def _robot(
-    path: Path,
-    robot: Source,
-    table: RobotTable,
-    stamps: NDArray[np.int64],
-    read_image: Callable[[int], Image],
+    path: Path, robot: Source, table: RobotTable, stamps: I64, read_image: Callable[[int], Image]
 ) -> RobotRecording[Image]:
     """One robot's part of the recording."""
     is_mav, calibration = robot == Source.MAV, table.calibration()

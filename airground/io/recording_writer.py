@@ -5,21 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from airground.core.arrays import I64
 from airground.core.messages import ImuSamples, MagneticSamples
 from airground.core.se3 import SE3
 from airground.io import layout
 from airground.io.calibration import RobotTable
 from airground.io.digests import file_digest, folder_digest
-from airground.io.euroc import (
-    camera_yaml,
-    sensor_yaml,
-    write_image_list,
-    write_imu,
-    write_magnetic,
-)
+from airground.io.euroc import camera_yaml, sensor_yaml, write_image_list, write_imu, write_magnetic
 from airground.io.header import Header, write_header
 from airground.io.tum import format_stamp, write_accelerometer, write_image_lists
 
@@ -40,11 +32,7 @@ def make_folders(root: Path) -> None:
 
 
 def write_mav(
-    root: Path,
-    told: RobotTable,
-    stamps_ns: NDArray[np.int64],
-    imu: ImuSamples,
-    magnetic: MagneticSamples,
+    root: Path, told: RobotTable, stamps_ns: I64, imu: ImuSamples, magnetic: MagneticSamples
 ) -> None:
     """Write the MAV's samples, image list and `sensor.yaml` files (EuRoC)."""
     names = [mav_image_name(int(stamp)) for stamp in stamps_ns]
@@ -55,11 +43,7 @@ def write_mav(
 
 
 def write_ground(
-    root: Path,
-    told: RobotTable,
-    stamps_ns: NDArray[np.int64],
-    imu: ImuSamples,
-    magnetic: MagneticSamples,
+    root: Path, told: RobotTable, stamps_ns: I64, imu: ImuSamples, magnetic: MagneticSamples
 ) -> None:
     """Write the ground robot's samples and image lists (TUM RGB-D, samples also EuRoC)."""
     names = [ground_image_name(int(stamp)) for stamp in stamps_ns]

@@ -12,9 +12,8 @@ from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from airground.core.arrays import read_only
+from airground.core.arrays import I64, read_only
 from airground.core.cloud import Source
 from airground.core.messages import (
     GroundImage,
@@ -86,7 +85,7 @@ class RobotRecording(Generic[Image]):
     layout: str
     robot: Source
     calibration: RobotCalibration
-    camera_stamps: NDArray[np.int64]
+    camera_stamps: I64
     imu: ImuSamples | None
     magnetic: MagneticSamples | None
     read_image: Callable[[int], Image]
@@ -168,9 +167,7 @@ class Pair:
         return self.mav if robot == Source.MAV else self.ground
 
     def messages(
-        self,
-        dropped: Mapping[Source, Collection[int]] = NOTHING,
-        robots: Sequence[Source] = BOTH,
+        self, dropped: Mapping[Source, Collection[int]] = NOTHING, robots: Sequence[Source] = BOTH
     ) -> Iterator[Stamped]:
         """Every message in order of time.
 

@@ -22,7 +22,7 @@ DISTORTION_MODELS = ("radial-tangential", "radtan")
 """Names of the one distortion model that is known, as EuRoC and Kalibr write it."""
 
 
-class _PlainLoader(yaml.SafeLoader):
+class _PlainLoader(yaml.SafeLoader):  # type: ignore[misc]  # yaml has no types
     """Numbers, text, lists and tables; aliases, of which few can mean millions, are refused."""
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:

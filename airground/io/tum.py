@@ -8,8 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import I64
 from airground.core.messages import ImuSamples
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
@@ -92,7 +92,7 @@ def write_tum(path: Path, trajectory: Trajectory) -> None:
     path.write_text(text + "\n", encoding="utf-8")
 
 
-def read_associations(path: Path) -> tuple[NDArray[np.int64], list[str], list[str]]:
+def read_associations(path: Path) -> tuple[I64, list[str], list[str]]:
     """Colour stamps (N,) [ns], colour files and depth files, relative to the list's folder.
 
     Raises:
@@ -116,7 +116,7 @@ def read_associations(path: Path) -> tuple[NDArray[np.int64], list[str], list[st
     return array, colour, depth
 
 
-def read_image_list(path: Path) -> tuple[NDArray[np.int64], list[str]]:
+def read_image_list(path: Path) -> tuple[I64, list[str]]:
     """Stamps (N,) [ns] and file names, relative to the list's folder, as in `rgb.txt`.
 
     Raises:
@@ -139,7 +139,7 @@ def read_image_list(path: Path) -> tuple[NDArray[np.int64], list[str]]:
     return array, names
 
 
-def write_image_lists(folder: Path, stamps_ns: NDArray[np.int64], names: list[str]) -> None:
+def write_image_lists(folder: Path, stamps_ns: I64, names: list[str]) -> None:
     """Write `rgb.txt`, `depth.txt` and `associations.txt` for images of the same names."""
     entries = list(zip([format_stamp(int(t)) for t in stamps_ns], names, strict=True))
     for kind in ("rgb", "depth"):

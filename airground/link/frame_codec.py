@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from airground.core.arrays import U8
 from airground.core.cloud import Source
 from airground.core.messages import GroundImage, MavImage
 from airground.core.se3 import SE3
@@ -47,7 +48,7 @@ def pack(frame: TrackedFrame, jpeg_quality: int | None = None) -> Parts:
         "corrected": pose.corrected,
         "north_rad": frame.north_rad,
     }
-    arrays: dict[str, NDArray] = {}
+    arrays: dict[str, NDArray[Any]] = {}
     if isinstance(image, GroundImage):
         arrays |= {"colour": image.colour, "depth": image.depth}
     elif jpeg_quality is None:
@@ -93,7 +94,7 @@ def as_received(image: MavImage, jpeg_quality: int) -> MavImage:
     return MavImage(image.stamp_ns, _from_jpeg(_jpeg(image.image, jpeg_quality)))
 
 
-def _frame(header: dict[str, Any], arrays: dict[str, NDArray]) -> TrackedFrame:
+def _frame(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> TrackedFrame:
     stamp_ns = int(header["stamp_ns"])
     image: MavImage | GroundImage
     if Source[header["robot"]] == Source.GROUND:
@@ -115,7 +116,7 @@ def _frame(header: dict[str, Any], arrays: dict[str, NDArray]) -> TrackedFrame:
     return TrackedFrame(image, pose, header["north_rad"], _trajectory(arrays))
 
 
-def _trajectory_arrays(trajectory: Trajectory | None) -> dict[str, NDArray]:
+def _trajectory_arrays(trajectory: Trajectory | None) -> dict[str, NDArray[Any]]:
     if trajectory is None:
         return {}
     return {
@@ -125,20 +126,20 @@ def _trajectory_arrays(trajectory: Trajectory | None) -> dict[str, NDArray]:
     }
 
 
-def _trajectory(arrays: dict[str, NDArray]) -> Trajectory | None:
+def _trajectory(arrays: dict[str, NDArray[Any]]) -> Trajectory | None:
     if "path_stamps_ns" not in arrays:
         return None
     names = ("path_stamps_ns", "path_rotations", "path_translations")
     return Trajectory(*(arrays[name] for name in names))
 
 
-def _message(header: dict[str, Any], arrays: dict[str, NDArray]) -> Parts:
+def _message(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Parts:
     told = [(name, array.dtype.str, array.shape) for name, array in arrays.items()]
     head = json.dumps(header | {"arrays": told}).encode()
     return [head, *(array.tobytes() for array in arrays.values())]
 
 
-def _parse(parts: Sequence[bytes]) -> tuple[dict[str, Any], dict[str, NDArray]]:
+def _parse(parts: Sequence[bytes]) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
     header = json.loads(parts[0])
     arrays = {}
     for (name, dtype, shape), block in zip(header["arrays"], parts[1:], strict=True):
@@ -148,12 +149,12 @@ def _parse(parts: Sequence[bytes]) -> tuple[dict[str, Any], dict[str, NDArray]]:
     return header, arrays
 
 
-def _jpeg(image: NDArray[np.uint8], quality: int) -> bytes:
+def _jpeg(image: U8, quality: int) -> bytes:
     _, packed = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])
     return packed.tobytes()
 
 
-def _from_jpeg(packed: bytes) -> NDArray[np.uint8]:
+def _from_jpeg(packed: bytes) -> U8:
     image = cv2.imdecode(np.frombuffer(packed, np.uint8), cv2.IMREAD_GRAYSCALE)
     if image is None:
         raise ValueError("an image is no JPEG")

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import Localization
 from airground.core.agreement import Agreement
+from airground.core.arrays import F64
 from airground.localization.cost_map import Overlays
 from airground.localization.particles import densest_mode
 
 
-def why_refused(
-    overlay: Overlays, agreed: Agreement, particles: NDArray, config: Localization
-) -> str:
+def why_refused(overlay: Overlays, agreed: Agreement, particles: F64, config: Localization) -> str:
     """One line on why no position is claimed; empty if one is.
 
     The particles' covariance says whether they agree with each other, not whether they are
@@ -45,7 +43,7 @@ def why_refused(
     return ""
 
 
-def _why_spread(particles: NDArray, config: Localization) -> str:
+def _why_spread(particles: F64, config: Localization) -> str:
     """Refuses particles that are spread; with `mode`, a minority elsewhere is allowed."""
     counted = particles
     if config.estimate == "mode":

@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from airground.core.arrays import F32, F64, Floats
 
 COUNT, SUM_A, SUM_G, SUM_AA, SUM_GG, SUM_AG = range(6)
 KEEPS_NAN = {"contract", "reassoc", "arcp", "nsz"}
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=KEEPS_NAN)
-def mean_height(heights: NDArray[np.float32]) -> tuple[float, int]:
+def mean_height(heights: F32) -> tuple[float, int]:
     """Mean (0 of none) and number of the heights that are not NaN."""
     total, count = 0.0, 0
     for i in range(len(heights)):
@@ -29,9 +30,7 @@ def mean_height(heights: NDArray[np.float32]) -> tuple[float, int]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def about_mean(
-    heights: NDArray[np.float32], margin: int
-) -> tuple[NDArray[np.float32], NDArray[np.float32], float]:
+def about_mean(heights: F32, margin: int) -> tuple[F32, F32, float]:
     """Heights with NaN in holes as heights about their mean, 0 in holes; the mask; the mean.
 
     Args:
@@ -55,7 +54,7 @@ def about_mean(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def zmssd(sums: NDArray, min_count: float) -> NDArray[np.float32]:
+def zmssd(sums: Floats, min_count: float) -> F32:
     """Eq. 2 [m^2] for sums (N, 6); NaN where fewer than `min_count` cells overlap."""
     costs = np.empty(len(sums), np.float32)
     for i in range(len(sums)):
@@ -71,9 +70,7 @@ def zmssd(sums: NDArray, min_count: float) -> NDArray[np.float32]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def one_minus_correlation(
-    sums: NDArray, min_count: float, min_relief_m: float
-) -> NDArray[np.float32]:
+def one_minus_correlation(sums: Floats, min_count: float, min_relief_m: float) -> F32:
     """1 - normalized correlation for sums (N, 6); NaN where fewer than `min_count` overlap.
 
     Standard deviations below `min_relief_m` are replaced by it: the noise of flat ground
@@ -95,12 +92,8 @@ def one_minus_correlation(
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=KEEPS_NAN)
 def sums_at_positions(
-    aerial: NDArray[np.float32],
-    aerial_mask: NDArray[np.float32],
-    ground: NDArray[np.float32],
-    ground_mask: NDArray[np.float32],
-    shifts: NDArray[np.float64],
-) -> NDArray[np.float64]:
+    aerial: F32, aerial_mask: F32, ground: F32, ground_mask: F32, shifts: F64
+) -> F64:
     """The six sums (M, 6) for M fractional shifts of one map over another.
 
     Ground heights are interpolated bilinearly between the filled ones of four cells, and
@@ -145,15 +138,15 @@ def sums_at_positions(
 # Inlined: called, it rounded otherwise once the caller came from the cache.
 @njit(cache=True, inline="always", error_model="numpy", fastmath=KEEPS_NAN)
 def _add_row(
-    heights: NDArray,
-    filled: NDArray,
-    g0: NDArray,
-    g1: NDArray,
-    m0: NDArray,
-    m1: NDArray,
+    heights: F32,
+    filled: F32,
+    g0: F32,
+    g1: F32,
+    m0: F32,
+    m1: F32,
     weight_x: np.float32,
     weight_y: np.float32,
-    sums: NDArray,
+    sums: F64,
 ) -> None:
     """Add one row of the overlap, between two rows of ground heights and of their mask."""
     zero, half = np.float32(0), np.float32(0.5)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import fft
 
 from airground.config import Localization
+from airground.core.arrays import C64, F32, F64, I64, Floats
 from airground.core.belief import CostMap, HeightMap
 from airground.core.height_map import lattice_index
 from airground.localization.cost_kernels import (
@@ -33,17 +34,17 @@ class Masked:
     float32 sums of squares lose the small differences that matter unless means go first.
     """
 
-    heights: NDArray[np.float32]
-    mask: NDArray[np.float32]
+    heights: F32
+    mask: F32
     mean: float
 
 
-def masked(heights: NDArray[np.float32], margin: int = 0) -> Masked:
+def masked(heights: F32, margin: int = 0) -> Masked:
     """Split heights with NaN into values and mask, with `margin` empty cells around."""
     return Masked(*about_mean(heights, margin))
 
 
-def costs_of(sums: NDArray, aerial_cells: int, config: Localization) -> NDArray[np.float32]:
+def costs_of(sums: Floats, aerial_cells: int, config: Localization) -> F32:
     """(N,) costs of the configured kind for sums (N, 6) over the overlap.
 
     Args:
@@ -73,7 +74,7 @@ class OffsetSearch:
     """
 
     def __init__(
-        self, ground: HeightMap, centre: ArrayLike, radius_m: float, reach_cells: NDArray
+        self, ground: HeightMap, centre: ArrayLike, radius_m: float, reach_cells: I64
     ) -> None:
         scale = ground.cells_per_m
         centre = np.asarray(centre, np.float64)
@@ -87,7 +88,7 @@ class OffsetSearch:
         patch = masked(_window(ground.heights, start, extent))
         self._spectra = self._transform(patch)
 
-    def sums(self, aerial: HeightMap) -> NDArray[np.float32]:
+    def sums(self, aerial: HeightMap) -> F32:
         """(nx, ny, 6) sums over the overlap at every offset; heights are about the means."""
         offset = lattice_index(aerial) - self._reach[0]
         inside = (offset >= 0).all() and (
@@ -109,7 +110,7 @@ class OffsetSearch:
         np.rint(sums[..., COUNT], out=sums[..., COUNT])
         return sums
 
-    def costs(self, aerial: HeightMap, config: Localization) -> NDArray[np.float32]:
+    def costs(self, aerial: HeightMap, config: Localization) -> F32:
         """(nx, ny) cost at every offset, NaN where too little overlaps."""
         sums = self.sums(aerial).reshape(-1, 6)
         return costs_of(sums, aerial.filled_cells, config).reshape(self.shape)
@@ -119,17 +120,18 @@ class OffsetSearch:
         origin = self.first / self.cells_per_m
         return CostMap(self.costs(aerial, config), origin, self.cells_per_m, heading, config.cost)
 
-    def _transform(self, patch: Masked) -> tuple[NDArray, NDArray, NDArray]:
+    def _transform(self, patch: Masked) -> tuple[C64, C64, C64]:
         images = (patch.mask, patch.heights, patch.heights**2)
         mask, heights, squares = (self._spectrum(image) for image in images)
         return mask, heights, squares
 
-    def _spectrum(self, image: NDArray[np.float32]) -> NDArray[np.complex64]:
+    def _spectrum(self, image: F32) -> C64:
         """`rfft2` of the image with zeros around, not spent on the rows that are all zeros."""
         rows, columns = self._fft_shape
-        return fft.fft(fft.rfft(image, columns, axis=1), rows, axis=0, overwrite_x=True)
+        result: C64 = fft.fft(fft.rfft(image, columns, axis=1), rows, axis=0, overwrite_x=True)
+        return result
 
-    def _correlate(self, product: NDArray[np.complex64], out: NDArray[np.float32]) -> None:
+    def _correlate(self, product: C64, out: F32) -> None:
         """`irfft2` of a product of spectra, not spent on rows that are no offset.
 
         The product's memory is used up: fresh memory costs as much as multiplying does.
@@ -156,7 +158,7 @@ def compute_cost_map(
     return search.cost_map(aerial, heading, config)
 
 
-def reach_of(aerial: HeightMap) -> NDArray[np.int64]:
+def reach_of(aerial: HeightMap) -> I64:
     """(2, 2) first and last lattice index of a map."""
     first = lattice_index(aerial)
     return np.array([first, first + aerial.heights.shape - 1])
@@ -172,20 +174,20 @@ class Overlays:
         aerial_cells: Filled cells of the aerial map.
     """
 
-    sums: NDArray[np.float64]
+    sums: F64
     mean_aerial: float
     mean_ground: float
     aerial_cells: int
 
-    def costs(self, config: Localization) -> NDArray[np.float32]:
+    def costs(self, config: Localization) -> F32:
         """(M,) costs, NaN where too little overlaps."""
         return costs_of(self.sums, self.aerial_cells, config)
 
-    def overlaps(self) -> NDArray[np.float64]:
+    def overlaps(self) -> F64:
         """(M,) overlap as a fraction of the aerial map's filled cells."""
         return self.sums[:, COUNT] / max(self.aerial_cells, 1)
 
-    def correlations(self) -> NDArray[np.float64]:
+    def correlations(self) -> F64:
         """(M,) normalized correlations of the heights, NaN without any overlap."""
         count = self.sums[:, COUNT]
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -193,25 +195,25 @@ class Overlays:
             variance_a, variance_g = self._variances()
             return covariance / count / np.sqrt(variance_a * variance_g)
 
-    def reliefs(self) -> NDArray[np.float64]:
+    def reliefs(self) -> F64:
         """(M,) the smaller of both maps' standard deviations over the overlap [m]."""
         return np.sqrt(np.minimum(*self._variances()))
 
-    def _variances(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _variances(self) -> tuple[F64, F64]:
         count = self.sums[:, COUNT]
         with np.errstate(invalid="ignore", divide="ignore"):
             aerial = self.sums[:, SUM_AA] / count - (self.sums[:, SUM_A] / count) ** 2
             ground = self.sums[:, SUM_GG] / count - (self.sums[:, SUM_G] / count) ** 2
         return np.maximum(aerial, 1e-12), np.maximum(ground, 1e-12)
 
-    def height_offsets(self) -> NDArray[np.float64]:
+    def height_offsets(self) -> F64:
         """(M,) Delta z = mean ground - mean aerial height over the overlap [m] (Sec. VI-A)."""
         with np.errstate(invalid="ignore", divide="ignore"):
             difference = (self.sums[:, SUM_G] - self.sums[:, SUM_A]) / self.sums[:, COUNT]
         return difference + self.mean_ground - self.mean_aerial
 
 
-def overlay_at(aerial: HeightMap, ground: HeightMap, positions: NDArray) -> Overlays:
+def overlay_at(aerial: HeightMap, ground: HeightMap, positions: F64) -> Overlays:
     """Lay the aerial map at M positions u (M, 2) [m] over the ground map, bilinearly."""
     places = np.asarray(positions, np.float64) * ground.cells_per_m
     heights, first = _within_reach(ground, places, reach_of(aerial))
@@ -221,7 +223,7 @@ def overlay_at(aerial: HeightMap, ground: HeightMap, positions: NDArray) -> Over
     return Overlays(sums, a.mean, g.mean, aerial.filled_cells)
 
 
-def overlay_turned(aerial: HeightMap, ground: HeightMap, poses: NDArray) -> Overlays:
+def overlay_turned(aerial: HeightMap, ground: HeightMap, poses: F64) -> Overlays:
     """The same for M poses (M, 3): x, y [m], and a turn of the aerial map [rad]."""
     poses = np.array(poses, np.float64)
     poses[:, :2] *= ground.cells_per_m
@@ -235,9 +237,7 @@ def overlay_turned(aerial: HeightMap, ground: HeightMap, poses: NDArray) -> Over
     return Overlays(sums, mean_aerial, mean_ground, cells.shape[1])
 
 
-def _within_reach(
-    ground: HeightMap, places: NDArray, reach_cells: NDArray
-) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+def _within_reach(ground: HeightMap, places: F64, reach_cells: I64) -> tuple[F32, I64]:
     """The ground heights that aerial maps about these places can lie on, and their first cell.
 
     Particles gather; preparing all of the ground map for them would take longer than using it.
@@ -255,7 +255,7 @@ def _within_reach(
     return ground.heights[low[0] : high[0], low[1] : high[1]].copy(), edge + low
 
 
-def _window(heights: NDArray[np.float32], start: NDArray, extent: NDArray) -> NDArray[np.float32]:
+def _window(heights: F32, start: I64, extent: I64) -> F32:
     """The cells from `start` over `extent`, NaN outside the map."""
     window = np.full(tuple(extent), np.nan, np.float32)
     low = np.maximum(start, 0)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64
 from airground.core.se3 import SE3, rotation_angle
 
 BINS = 720
@@ -35,7 +35,7 @@ class HeadingEstimator:
         self._counts = np.zeros(BINS)
         self._sums = np.zeros(BINS, np.complex128)
 
-    def add(self, field_imu: NDArray, T_map_imu: SE3) -> None:
+    def add(self, field_imu: F64, T_map_imu: SE3) -> None:
         """Take in magnetic field samples.
 
         Args:
@@ -71,17 +71,17 @@ class HeadingEstimator:
             return float("inf")
         return self._spread(self._weights())
 
-    def _spread(self, weights: NDArray) -> float:
+    def _spread(self, weights: F64) -> float:
         length = abs((weights * self._sums).sum()) / (weights * self._counts).sum()
         return float(np.sqrt(-2 * np.log(min(length, 1.0))))
 
-    def _weights(self) -> NDArray[np.float64]:
+    def _weights(self) -> F64:
         """(BINS,) weight of each direction: a bell around the densest, a few kernels wide."""
         density = np.fft.irfft(np.fft.rfft(self._counts) * _SMOOTHING, BINS)
         return np.roll(_BELL, int(np.argmax(density)))
 
 
-def _bell(sigma_deg: float) -> NDArray[np.float64]:
+def _bell(sigma_deg: float) -> F64:
     """(BINS,) Gaussian over the circle, around the first bin."""
     distance = np.minimum(np.arange(BINS), BINS - np.arange(BINS)) * 360.0 / BINS
     return np.exp(-0.5 * (distance / sigma_deg) ** 2)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import HeightMaps
+from airground.core.arrays import F32, F64
 from airground.core.belief import HeightMap
 from airground.core.height_map import make_height_map
 
 
 def aerial_height_map(
-    points_mav: NDArray, position_mav: NDArray, heading: float, config: HeightMaps
+    points_mav: F32, position_mav: F64, heading: float, config: HeightMaps
 ) -> HeightMap:
     """Heights of an aerial surface around the camera that saw it.
 
@@ -30,9 +30,7 @@ def aerial_height_map(
     )
 
 
-def around_camera(
-    points_mav: NDArray, position_mav: NDArray, heading: float
-) -> NDArray[np.float32]:
+def around_camera(points_mav: F32, position_mav: F64, heading: float) -> F32:
     """(N, 3) points with x, y relative to the camera, turned by the heading; z unchanged."""
     c, s = np.cos(heading), np.sin(heading)
     offsets = np.asarray(points_mav, np.float64)[:, :2] - np.asarray(position_mav)[:2]
@@ -44,7 +42,7 @@ def around_camera(
 
 
 def ground_height_map(
-    points_ground: NDArray, centre: NDArray, reach_m: float, config: HeightMaps
+    points_ground: F32, centre: F64, reach_m: float, config: HeightMaps
 ) -> HeightMap:
     """Heights of the ground robot's map over the square of half side `reach_m` at `centre`.
 

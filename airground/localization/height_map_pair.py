@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import Config
+from airground.core.arrays import F32, F64
 from airground.core.belief import HeightMap
 from airground.errors import InputError
 from airground.localization.cost_map import Overlays, overlay_at, overlay_turned, reach_of
@@ -27,17 +27,17 @@ class HeightMapPair:
         stamp_ns: Of the surface.
         points_mav: (N, 3) its points in `mav` [m].
         position_mav: (3,) the camera that it was seen from, in `mav` [m].
-        ground_map: (N, 3) the ground robot's points in `ground` [m], or their height map.
+        points_ground: (M, 3) the ground robot's map in `ground` [m].
         ground_robot_position: (2,) middle of the search region in `ground` [m].
         heading: Turn of `mav` in `ground` [rad]; not used where it is searched.
         config: The pipeline's parameters; height maps and localization are used.
     """
 
     stamp_ns: int
-    points_mav: NDArray
-    position_mav: NDArray
-    ground_map: HeightMap | NDArray
-    ground_robot_position: NDArray
+    points_mav: F32
+    position_mav: F64
+    points_ground: F32
+    ground_robot_position: F64
     heading: float | None
     config: Config
 
@@ -71,23 +71,13 @@ class HeightMapPair:
 
     @cached_property
     def ground(self) -> HeightMap:
-        """Heights of the ground map, as far as the aerial one may reach.
-
-        Raises:
-            InputError: One was given, of another resolution.
-        """
-        wanted = self.config.height_maps
-        if isinstance(self.ground_map, HeightMap):
-            if self.ground_map.cells_per_m != wanted.cells_per_m:
-                raise InputError(
-                    f"ground height map: {self.ground_map.cells_per_m:g} cells/m, expected "
-                    f"{wanted.cells_per_m:g} (height_maps.cells_per_m)"
-                )
-            return self.ground_map
+        """Heights of the ground map, as far as the aerial one may reach."""
         reach_cells = float(np.linalg.norm(reach_of(self.aerial), axis=1).max() + 2)
         reach_m = reach_cells / self.aerial.cells_per_m
         reach_m += self.config.localization.search_radius_m
-        return ground_height_map(self.ground_map, self.ground_robot_position, reach_m, wanted)
+        return ground_height_map(
+            self.points_ground, self.ground_robot_position, reach_m, self.config.height_maps
+        )
 
     @cached_property
     def volume(self) -> CostVolume:
@@ -97,7 +87,7 @@ class HeightMapPair:
             return search_headings(self.aerial, self.ground, robot, local)
         return search_positions(self.aerial, self.ground, robot, self.turn, local)
 
-    def overlay(self, particles: NDArray) -> Overlays:
+    def overlay(self, particles: F64) -> Overlays:
         """The aerial heights laid on the ground's at each of (M, 3) x, y [m] and heading [rad]."""
         if self.searched:
             return overlay_turned(self.aerial, self.ground, particles)

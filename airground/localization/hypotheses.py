@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import get_num_threads
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from airground.config import Localization
+from airground.core.arrays import F32, F64
 from airground.core.belief import CostMap, HeightMap
 from airground.core.height_map import lattice_index, make_height_map
 from airground.localization.cost_map import OffsetSearch, reach_of
@@ -30,9 +31,9 @@ class CostVolume:
         cells_per_m: Resolution.
     """
 
-    headings: NDArray[np.float64]
-    costs: NDArray[np.float32]
-    origin: NDArray[np.float64]
+    headings: F64
+    costs: F32
+    origin: F64
     cells_per_m: float
 
     @property
@@ -48,7 +49,7 @@ class CostVolume:
         heading = float(self.headings[best])
         return CostMap(self.costs[best], self.origin, self.cells_per_m, heading, cost)
 
-    def draw(self, count: int, sigma: float, rng: np.random.Generator) -> NDArray[np.float64]:
+    def draw(self, count: int, sigma: float, rng: np.random.Generator) -> F64:
         """(count, 3) hypotheses by Eq. 5, spread evenly within their cells; uniform if none fit."""
         costs = self.costs if self.feasible else np.zeros_like(self.costs)
         turn, ix, iy = draw_cells(costs, sigma, count, rng)
@@ -87,7 +88,7 @@ def search_headings(
     search = OffsetSearch(ground, centre, config.search_radius_m, reach_cells)
     step = max(1, int(COARSE_STEP_DEG / 360.0 * config.headings))
 
-    def costs_of(turn: int) -> NDArray[np.float32]:
+    def costs_of(turn: int) -> F32:
         return _costs_turned(search, cells, turn, aerial.cells_per_m, config)
 
     coarse = list(range(0, config.headings, step))
@@ -104,7 +105,7 @@ def search_headings(
     return CostVolume(headings, costs, search.first / search.cells_per_m, search.cells_per_m)
 
 
-def _cells(aerial: HeightMap) -> NDArray[np.float32]:
+def _cells(aerial: HeightMap) -> F32:
     """(K, 3) centres and heights of the filled cells."""
     ix, iy = np.nonzero(np.isfinite(aerial.heights))
     xy = (np.column_stack([ix, iy]) + lattice_index(aerial)) / aerial.cells_per_m
@@ -112,8 +113,8 @@ def _cells(aerial: HeightMap) -> NDArray[np.float32]:
 
 
 def _costs_turned(
-    search: OffsetSearch, cells: NDArray, turn: int, cells_per_m: float, config: Localization
-) -> NDArray[np.float32]:
+    search: OffsetSearch, cells: F32, turn: int, cells_per_m: float, config: Localization
+) -> F32:
     angle = 2 * np.pi * turn / config.headings
     c, s = np.float32(np.cos(angle)), np.float32(np.sin(angle))
     turned = cells.copy()

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import Config
 from airground.core.agreement import agreement
+from airground.core.arrays import F64, Floats
 from airground.core.belief import Belief
 from airground.core.events import BeliefUpdated, CostMapComputed, Event, HeightMapsMade
 from airground.core.height_map import make_height_map
@@ -35,7 +35,7 @@ class MonteCarloLocalizer:
         self.config = config
         self._local = config.localization
         self._rng = rng
-        self._particles: NDArray[np.float64] | None = None
+        self._particles: F64 | None = None
         self._position_mav = np.zeros(3)
         self.belief: Belief | None = None
 
@@ -76,14 +76,12 @@ class MonteCarloLocalizer:
         self._position_mav = position_mav
         yield BeliefUpdated(pair.stamp_ns, self.belief)
 
-    def _sigma_of(self, costs: NDArray) -> float:
+    def _sigma_of(self, costs: Floats) -> float:
         """Sigma of Eq. 5 in units of the costs that it is used on."""
         scale = span(costs) if self._local.sigma_units == "minmax" else 1.0
         return self._local.sigma * scale
 
-    def _move(
-        self, particles: NDArray, motion_mav: NDArray, pair: HeightMapPair
-    ) -> NDArray[np.float64]:
+    def _move(self, particles: F64, motion_mav: F64, pair: HeightMapPair) -> F64:
         """Eq. 6: the motion that the MAV's SLAM saw, turned into `ground`, plus noise."""
         m = len(particles)
         moved = particles.copy()
@@ -97,7 +95,7 @@ class MonteCarloLocalizer:
         moved[:, :2] += self._local.motion_noise_m * self._rng.normal(size=(m, 2))
         return moved
 
-    def _redraw(self, particles: NDArray, volume: CostVolume | None) -> NDArray[np.float64]:
+    def _redraw(self, particles: F64, volume: CostVolume | None) -> F64:
         """Replace a share of the particles by draws from the current cost map.
 
         They join after the belief was summarized: the next aerial map judges them first.
@@ -109,7 +107,7 @@ class MonteCarloLocalizer:
         kept = self._rng.permutation(len(particles))[count:]
         return np.concatenate([particles[kept], drawn])
 
-    def _summarize(self, pair: HeightMapPair, particles: NDArray) -> Belief:
+    def _summarize(self, pair: HeightMapPair, particles: F64) -> Belief:
         counted = particles
         if self._local.estimate == "mode":
             counted = particles[densest_mode(particles)]
@@ -132,7 +130,7 @@ class MonteCarloLocalizer:
         )
 
 
-def motion_at(estimate: NDArray, position_mav: NDArray, height_offset: float) -> SE3:
+def motion_at(estimate: F64, position_mav: F64, height_offset: float) -> SE3:
     """T_ground_mav that brings the camera at `position_mav` to the estimate (x, y, heading)."""
     turned = SE3.from_heading(estimate[2])
     translation = np.array([*estimate[:2], 0.0]) - turned @ position_mav

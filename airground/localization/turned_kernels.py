@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit, prange
-from numpy.typing import NDArray
 
+from airground.core.arrays import F32, F64, U32
 from airground.localization.cost_kernels import KEEPS_NAN, mean_height
 
 BLOCK = 512
@@ -19,9 +19,7 @@ MARGIN = 2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def filled_cells(
-    heights: NDArray[np.float32], first_x: int, first_y: int
-) -> tuple[NDArray[np.float32], float]:
+def filled_cells(heights: F32, first_x: int, first_y: int) -> tuple[F32, float]:
     """The filled cells of an aerial map (3, K): x, y [cells], height about the mean; the mean.
 
     Args:
@@ -41,7 +39,7 @@ def filled_cells(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def in_fours(heights: NDArray[np.float32]) -> tuple[NDArray[np.float32], float]:
+def in_fours(heights: F32) -> tuple[F32, float]:
     """Ground heights about their mean (nx + 4, ny + 4, 4), each with those beside and behind.
 
     Args:
@@ -68,9 +66,7 @@ def in_fours(heights: NDArray[np.float32]) -> tuple[NDArray[np.float32], float]:
 
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=KEEPS_NAN)
-def sums_at_poses(
-    cells: NDArray[np.float32], fours: NDArray[np.float32], poses: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def sums_at_poses(cells: F32, fours: F32, poses: F64) -> F64:
     """The six sums (M, 6) for M poses of a turned aerial map.
 
     Args:
@@ -107,15 +103,15 @@ def sums_at_poses(
 
 @njit(cache=True, error_model="numpy", fastmath=KEEPS_NAN)
 def _place_cells(
-    cell_x: NDArray,
-    cell_y: NDArray,
+    cell_x: F32,
+    cell_y: F32,
     place: tuple[np.float32, np.float32],
     turn: tuple[np.float32, np.float32],
     last: tuple[np.float32, np.float32],
     columns: int,
-    index: NDArray,
-    fraction_x: NDArray,
-    fraction_y: NDArray,
+    index: U32,
+    fraction_x: F32,
+    fraction_y: F32,
 ) -> None:
     """Where cells fall in the ground map: flat index of the corner before, and the rest."""
     (x0, y0), (c, s), (last_x, last_y) = place, turn, last
@@ -130,7 +126,7 @@ def _place_cells(
 
 
 @njit(cache=True, error_model="numpy")
-def _look_up(packed: NDArray, index: NDArray, n: int, corners: NDArray) -> None:
+def _look_up(packed: F64, index: U32, n: int, corners: F64) -> None:
     """The four heights around each of n places."""
     for i in range(n):
         four = 2 * index[i]
@@ -138,13 +134,7 @@ def _look_up(packed: NDArray, index: NDArray, n: int, corners: NDArray) -> None:
 
 
 @njit(cache=True, error_model="numpy", fastmath=KEEPS_NAN)
-def _add_cells(
-    aerial: NDArray,
-    fraction_x: NDArray,
-    fraction_y: NDArray,
-    corners: NDArray,
-    sums: NDArray,
-) -> None:
+def _add_cells(aerial: F32, fraction_x: F32, fraction_y: F32, corners: F32, sums: F64) -> None:
     """Add cells to the sums, given their fractions and the ground at their four corners."""
     zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)
     n, sum_a, sum_g, sum_aa, sum_gg, sum_ag = zero, zero, zero, zero, zero, zero

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import Config, Refinement
 from airground.core.agreement import agreement
+from airground.core.arrays import F32, F64, Mask
 from airground.core.belief import Alignment, HeightMap
 from airground.core.cloud import PointCloud
 from airground.core.height_map import lattice_index, make_height_map
@@ -20,11 +20,7 @@ COVER_CELLS_PER_M = 25.0
 
 
 def refine(
-    stamp_ns: int,
-    T_ground_mav_start: SE3,
-    aerial: PointCloud,
-    ground: PointCloud,
-    config: Config,
+    stamp_ns: int, T_ground_mav_start: SE3, aerial: PointCloud, ground: PointCloud, config: Config
 ) -> Alignment:
     """Align an aerial cloud with the ground map.
 
@@ -72,17 +68,18 @@ def _refused(stamp_ns: int, motion: SE3, refusal: str) -> Alignment:
     return Alignment(stamp_ns, motion, 0.0, float("nan"), False, refusal)
 
 
-def _nearby(ground: NDArray, aerial_ground: NDArray, settings: Refinement) -> NDArray:
+def _nearby(ground: F32, aerial_ground: F64, settings: Refinement) -> F32:
     """Ground points that some correspondence could use, wherever the search ends."""
     margin = settings.max_distance_m
     if settings.local_search:
         margin += settings.local_search_radius_m + 0.3
     low, high = aerial_ground.min(axis=0)[:2] - margin, aerial_ground.max(axis=0)[:2] + margin
     inside = ((ground[:, :2] >= low) & (ground[:, :2] <= high)).all(axis=1)
-    return ground[inside]
+    result: F32 = ground[inside]
+    return result
 
 
-def _levelled(motion: SE3, points: NDArray) -> SE3:
+def _levelled(motion: SE3, points: F32) -> SE3:
     """The same place of the points' middle, with only the heading of the rotation."""
     centre = points.mean(axis=0, dtype=np.float64)
     turned = SE3.from_heading(motion.heading())
@@ -120,7 +117,7 @@ def _judged(
     return Alignment(stamp_ns, motion, share, rmse_m, not refusal, refusal)
 
 
-def _covered(points: NDArray, cover: HeightMap) -> NDArray[np.bool_]:
+def _covered(points: F64, cover: HeightMap) -> Mask:
     """(N,) which points are over cells that the ground robot saw something of."""
     cells = np.floor(points[:, :2] * cover.cells_per_m + 0.5).astype(int) - lattice_index(cover)
     inside = ((cells >= 0) & (cells < cover.heights.shape)).all(axis=1)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from airground.config import Refinement
+from airground.core.arrays import F64, Mask
 from airground.core.se3 import SE3
 from airground.refinement.surfels import Surfels
 
@@ -33,7 +33,7 @@ class Fit:
     correspondences: int
 
 
-def point_to_plane_icp(source: NDArray, target: Surfels, start: SE3, config: Refinement) -> Fit:
+def point_to_plane_icp(source: F64, target: Surfels, start: SE3, config: Refinement) -> Fit:
     """Move a cloud until the distances along the target's normals are least.
 
     Args:
@@ -67,7 +67,7 @@ def point_to_plane_icp(source: NDArray, target: Surfels, start: SE3, config: Ref
     return Fit(motion, False, used)
 
 
-def _closest(squared: NDArray, distance: float, share: float) -> NDArray[np.bool_]:
+def _closest(squared: F64, distance: float, share: float) -> Mask:
     """Correspondences within the distance, and of these the closest share."""
     near = squared < distance * distance
     if near.any() and share < 1:
@@ -75,7 +75,7 @@ def _closest(squared: NDArray, distance: float, share: float) -> NDArray[np.bool
     return near
 
 
-def _solve(moved: NDArray, points: NDArray, normals: NDArray) -> SE3:
+def _solve(moved: F64, points: F64, normals: F64) -> SE3:
     """The small motion that least squares of the point-to-plane distances asks for."""
     # Turning about the middle of the points keeps the normal equations well conditioned.
     centre = moved.mean(axis=0)
@@ -88,7 +88,7 @@ def _solve(moved: NDArray, points: NDArray, normals: NDArray) -> SE3:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _normal_equations(moved: NDArray, points: NDArray, normals: NDArray) -> tuple[NDArray, NDArray]:
+def _normal_equations(moved: F64, points: F64, normals: F64) -> tuple[F64, F64]:
     """Sums over J^T J (6, 6) and -J^T r (6,) with J = [p x n, n] and r = n . (p - q)."""
     matrix = np.zeros((6, 6))
     vector = np.zeros(6)

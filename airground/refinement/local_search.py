@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from airground.config import Refinement
+from airground.core.arrays import F32, F64, I64
 from airground.core.belief import HeightMap
 from airground.core.height_map import lattice_index, make_height_map
 from airground.core.se3 import SE3
@@ -16,7 +16,7 @@ MIN_OVERLAP = 0.5
 MIN_CELLS = 50
 
 
-def search_nearby(aerial: NDArray, ground: NDArray, start: SE3, config: Refinement) -> SE3 | None:
+def search_nearby(aerial: F64, ground: F32, start: SE3, config: Refinement) -> SE3 | None:
     """The level motion around a start whose height maps agree best.
 
     Searches shifts within the configured radius and a few degrees of heading, turned about
@@ -49,9 +49,7 @@ def search_nearby(aerial: NDArray, ground: NDArray, start: SE3, config: Refineme
     return best
 
 
-def _best_shift(
-    aerial: HeightMap, ground: HeightMap, reach: int
-) -> tuple[float, NDArray[np.int64], float]:
+def _best_shift(aerial: HeightMap, ground: HeightMap, reach: int) -> tuple[float, I64, float]:
     """Lowest cost [m^2], its shift [cells] and height offset [m] within `reach` cells."""
     first = lattice_index(aerial) - lattice_index(ground)
     costs, counts, heights = _shift_costs(aerial.heights, ground.heights, first, reach)
@@ -62,9 +60,7 @@ def _best_shift(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _shift_costs(
-    aerial: NDArray, ground: NDArray, first: NDArray, reach: int
-) -> tuple[NDArray, NDArray, NDArray]:
+def _shift_costs(aerial: F32, ground: F32, first: I64, reach: int) -> tuple[F64, F64, F64]:
     """Eq. 2, overlapping cells and mean height difference for every shift; NaN is a hole."""
     side = 2 * reach + 1
     costs = np.full((side, side), np.inf)
@@ -89,7 +85,7 @@ def _shift_costs(
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
-def _row_sums(aerial: NDArray, ground: NDArray) -> tuple[np.float32, np.float32, np.float32]:
+def _row_sums(aerial: F32, ground: F32) -> tuple[np.float32, np.float32, np.float32]:
     zero, one = np.float32(0), np.float32(1)
     count, total, squares = zero, zero, zero
     for i in range(len(aerial)):

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import small_gicp
 from numba import get_num_threads
-from numpy.typing import NDArray
+
+from airground.core.arrays import F32, F64, I64
 
 NEIGHBOURS = 10
 
@@ -22,14 +23,14 @@ class Surfels:
         tree: Over `points`.
     """
 
-    points: NDArray[np.float64]
-    normals: NDArray[np.float64]
+    points: F64
+    normals: F64
     tree: small_gicp.KdTree
 
     def __len__(self) -> int:
         return len(self.points)
 
-    def nearest(self, points: NDArray) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    def nearest(self, points: F64) -> tuple[I64, F64]:
         """(N,) index of the nearest point, and (N,) squared distance to it [m^2]."""
         index, squared = self.tree.batch_nearest_neighbor_search(
             points, num_threads=get_num_threads()
@@ -37,7 +38,7 @@ class Surfels:
         return np.asarray(index, np.int64), np.asarray(squared)
 
 
-def make_surfels(points: NDArray, voxel_m: float) -> Surfels:
+def make_surfels(points: F32, voxel_m: float) -> Surfels:
     """Average points over cubes and fit a plane to each one's neighbours.
 
     Args:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+
+from airground.core.arrays import F32, U8, Mask
 
 QUALITY = 2e-4
 """Smallest eigenvalue of a corner's gradient matrix: below it, noise is as strong."""
@@ -16,12 +17,8 @@ BORDER_PX = 12
 
 
 def detect_corners(
-    image: NDArray[np.uint8],
-    occupied: NDArray[np.float32],
-    wanted: int,
-    spacing_px: int,
-    preferred: NDArray[np.bool_] | None = None,
-) -> NDArray[np.float32]:
+    image: U8, occupied: F32, wanted: int, spacing_px: int, preferred: Mask | None = None
+) -> F32:
     """The strongest corners, one a cell of a grid, where none is followed yet.
 
     The grid keeps a cluttered part of the scene from taking all corners, and the strongest

@@ -9,9 +9,9 @@ each time, and only so the number of keyframes stays bounded in a bounded area.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import KeyframeSlam
+from airground.core.arrays import F64, I64, Mask
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam.map_adjustment import MapAdjuster
@@ -104,26 +104,16 @@ class KeyframeCuller:
         views = self._views(rotations[alike], centres[alike], points)
         return bool((views >= COVERED_BY).mean() >= COVERED_SHARE)
 
-    def _alike(
-        self,
-        rotations: NDArray[np.float64],
-        centres: NDArray[np.float64],
-        keyframe: int,
-        middle: NDArray[np.float64],
-    ) -> NDArray[np.bool_]:
+    def _alike(self, rotations: F64, centres: F64, keyframe: int, middle: F64) -> Mask:
         """(K,) which cameras see a place from the same side and about as far as a keyframe."""
         cosines = (np.einsum("nij,ij->n", rotations, rotations[keyframe]) - 1.0) / 2.0
         depths = np.einsum("ni,ni->n", middle - centres, rotations[:, :, 2])
         with np.errstate(divide="ignore", invalid="ignore"):
             zoom = np.abs(np.log(depths / depths[keyframe]))
-        return (cosines > np.cos(np.deg2rad(MAX_TURN_DEG))) & (zoom < np.log(MAX_ZOOM))
+        result: Mask = (cosines > np.cos(np.deg2rad(MAX_TURN_DEG))) & (zoom < np.log(MAX_ZOOM))
+        return result
 
-    def _views(
-        self,
-        rotations: NDArray[np.float64],
-        centres: NDArray[np.float64],
-        points: NDArray[np.float64],
-    ) -> NDArray[np.int64]:
+    def _views(self, rotations: F64, centres: F64, points: F64) -> I64:
         """(n,) in how many of the cameras each point lies inside the image."""
         seen = np.einsum("kij,kni->knj", rotations, points - centres[:, None])
         camera = self._camera
@@ -132,4 +122,5 @@ class KeyframeCuller:
             y = camera.fy * seen[..., 1] / seen[..., 2] + camera.cy
         inside = (seen[..., 2] > 0) & (x >= BORDER_PX) & (y >= BORDER_PX)
         inside &= (x < camera.width - BORDER_PX) & (y < camera.height - BORDER_PX)
-        return inside.sum(axis=0)
+        result: I64 = inside.sum(axis=0)
+        return result

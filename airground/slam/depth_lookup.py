@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from airground.core.arrays import F32, F64, Floats
 
 REACH_PX = 4
 STEPS = (-REACH_PX, -1, 0, 1, REACH_PX)
@@ -14,9 +15,7 @@ MAX_SPREAD = 0.05
 where depth varies more than this share of it within reach, it may belong to either side."""
 
 
-def inverse_depths_at(
-    depth: NDArray[np.float32], pixels: NDArray, max_depth_m: float
-) -> NDArray[np.float64]:
+def inverse_depths_at(depth: F32, pixels: Floats, max_depth_m: float) -> F64:
     """(N,) inverse depth [1/m] at (N, 2) pixels; NaN where none can be trusted.
 
     Args:
@@ -30,7 +29,7 @@ def inverse_depths_at(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _look_up(depth: NDArray, pixels: NDArray, max_depth_m: float, inverse: NDArray) -> None:
+def _look_up(depth: F32, pixels: F64, max_depth_m: float, inverse: F64) -> None:
     """The median of 25 depths around each pixel, compiled: every image asks for hundreds."""
     height, width = depth.shape
     around = np.empty(len(STEPS) ** 2)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam.feature_tracker import FeatureTracker
@@ -12,12 +12,8 @@ from airground.slam.sparse_map import SparseMap
 
 
 def expected_pixels(
-    sparse_map: SparseMap,
-    tracker: FeatureTracker,
-    camera: PinholeCamera,
-    here: SE3,
-    there: SE3,
-) -> NDArray[np.float64]:
+    sparse_map: SparseMap, tracker: FeatureTracker, camera: PinholeCamera, here: SE3, there: SE3
+) -> F64:
     """(N, 2) pixels of the tracker's corners in the next image.
 
     Map points go by their place, other corners as if they were as far as most map points.

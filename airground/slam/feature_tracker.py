@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import I64, U8, Floats, Mask
 from airground.slam.optical_flow import flow
 
 NOTHING = np.empty((0, 2), np.float32)
@@ -31,17 +31,17 @@ class FeatureTracker:
 
     def clear(self) -> None:
         """Follow nothing any more."""
-        self.image: NDArray[np.uint8] | None = None
+        self.image: U8 | None = None
         self.ids = np.empty(0, np.int64)
         self.pixels = NOTHING
         self.failures = np.empty(0, np.int64)
 
-    def restart(self, image: NDArray[np.uint8]) -> None:
+    def restart(self, image: U8) -> None:
         """Follow nothing any more, and go on from this image."""
         self.clear()
         self.image = image
 
-    def advance(self, image: NDArray[np.uint8], start: NDArray, extra_levels: int = 0) -> None:
+    def advance(self, image: U8, start: Floats, extra_levels: int = 0) -> None:
         """Follow every corner into the next image; those not found are given up.
 
         Args:
@@ -58,12 +58,12 @@ class FeatureTracker:
             self.keep(found)
         self.image = image
 
-    def keep(self, kept: NDArray[np.bool_]) -> None:
+    def keep(self, kept: Mask) -> None:
         """Give up all but the marked corners."""
         self.ids, self.pixels = self.ids[kept], self.pixels[kept]
         self.failures = self.failures[kept]
 
-    def judge(self, ids: NDArray[np.int64], fits: NDArray[np.bool_], patience: int) -> None:
+    def judge(self, ids: I64, fits: Mask, patience: int) -> None:
         """Note which points fitted the pose; give up those that failed `patience` times."""
         where = np.isin(self.ids, ids)
         fitted = np.isin(self.ids, ids[fits])
@@ -84,7 +84,7 @@ class FeatureTracker:
         kept[by_age[first]] = True
         self.keep(kept)
 
-    def add(self, ids: NDArray[np.int64], pixels: NDArray) -> None:
+    def add(self, ids: I64, pixels: Floats) -> None:
         """Follow further corners of the newest image."""
         self.ids = np.concatenate([self.ids, ids])
         self.pixels = np.concatenate([self.pixels, np.asarray(pixels, np.float32).reshape(-1, 2)])

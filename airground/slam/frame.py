@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from airground.core.arrays import F32, U8
 from airground.errors import InputError
 
 
@@ -21,8 +19,8 @@ class Frame:
     """
 
     stamp_ns: int
-    image: NDArray[np.uint8]
-    depth: NDArray[np.float32] | None = None
+    image: U8
+    depth: F32 | None = None
 
 
 def require_order(stamp_ns: int, last_ns: int | None) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64, Mask
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3, nearest_rotation
 from airground.slam.geometry.pose_estimation import PoseFit, estimate_pose
@@ -24,8 +24,8 @@ POSITION_SIGMA_M = 0.02
 
 
 def frame_pose(
-    points_map: NDArray[np.float64],
-    pixels: NDArray[np.float64],
+    points_map: F64,
+    pixels: F64,
     camera: PinholeCamera,
     T_map_camera_predicted: SE3,
     *,
@@ -34,7 +34,7 @@ def frame_pose(
     inertial: bool,
     min_points: int,
     rng: np.random.Generator,
-    inverse_depths: NDArray[np.float64] | None = None,
+    inverse_depths: F64 | None = None,
     inverse_depth_sigma: float = 1.0,
 ) -> PoseFit | None:
     """Reject outliers, by the known rotation where there is a gyro, and fit the rest.
@@ -90,14 +90,14 @@ def frame_pose(
 
 
 def _consensus(
-    points_map: NDArray[np.float64],
-    pixels: NDArray[np.float64],
+    points_map: F64,
+    pixels: F64,
     camera: PinholeCamera,
     predicted: SE3,
     rotation_sigma: float | None,
     threshold_px: float,
     rng: np.random.Generator,
-) -> tuple[SE3 | None, NDArray[np.bool_]]:
+) -> tuple[SE3 | None, Mask]:
     """A pose that many points agree on, and which."""
     if rotation_sigma is not None:
         return translation_by_known_rotation(

@@ -11,9 +11,8 @@ from enum import Enum
 from typing import Protocol, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from airground.core.arrays import read_only
+from airground.core.arrays import F32, F64, Mask, read_only
 from airground.core.messages import GroundImage, ImuSamples, MavImage
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
@@ -49,8 +48,8 @@ class TrackedCorners:
         mapped: (N,) whether each is in the map, so that it counts for the pose.
     """
 
-    pixels: NDArray[np.float32]
-    mapped: NDArray[np.bool_]
+    pixels: F32
+    mapped: Mask
 
     def __post_init__(self) -> None:
         pixels = read_only(self.pixels, "pixels", (None, 2), np.float32)
@@ -81,7 +80,7 @@ class TrackedPose:
     stamp_ns: int
     tracking: Tracking
     T_map_camera: SE3 | None
-    covariance: NDArray[np.float64] | None = None
+    covariance: F64 | None = None
     scale: ScaleEstimate | None = None
     depth_range: tuple[float, float] | None = None
     corrected: bool = False

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F32, F64, U8
 from airground.core.camera import PinholeCamera
 from airground.slam import so3
 
@@ -31,9 +31,9 @@ class ImageTurn:
         self._factor = max(1, round(camera.width / SMALL_WIDTH))
         size = camera.width // self._factor, camera.height // self._factor
         self._window = cv2.createHanningWindow(size, cv2.CV_32F)
-        self._last: NDArray[np.float32] | None = None
+        self._last: F32 | None = None
 
-    def follow(self, image: NDArray[np.uint8]) -> NDArray[np.float64] | None:
+    def follow(self, image: U8) -> F64 | None:
         """(2,) turn since the last image about the camera's x and y axes [rad]; None if unclear."""
         height, width = self._window.shape
         shrunk = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
@@ -49,12 +49,7 @@ class ImageTurn:
         about_x = np.arctan2(down * self._factor, self._camera.fy)
         return np.array([about_x, about_y])
 
-    def rig_turn(
-        self,
-        image: NDArray[np.uint8],
-        last_turn: NDArray[np.float64],
-        R_rig_camera: NDArray[np.float64],
-    ) -> NDArray[np.float64]:
+    def rig_turn(self, image: U8, last_turn: F64, R_rig_camera: F64) -> F64:
         """(3, 3) turn of the rig to the next image; about the optical axis as last time.
 
         Args:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import KeyframeSlam
+from airground.core.arrays import F32, F64
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam.feature_tracker import FeatureTracker
@@ -83,7 +83,7 @@ def what_is_new(
     sparse_map: SparseMap,
     last: Keyframe,
     tracker: FeatureTracker,
-    R_last_here: NDArray[np.float64],
+    R_last_here: F64,
     camera: PinholeCamera,
 ) -> News:
     """Compare the newest image with the last keyframe.
@@ -106,11 +106,10 @@ def what_is_new(
     )
 
 
-def _turned(
-    pixels: NDArray[np.float32], R: NDArray[np.float64], camera: PinholeCamera
-) -> NDArray[np.float64]:
+def _turned(pixels: F32, R: F64, camera: PinholeCamera) -> F64:
     """(N, 2) where pixels would be, had the camera not turned by R."""
     matrix = camera.matrix()
     rays = np.column_stack([pixels, np.ones(len(pixels))]) @ np.linalg.inv(matrix).T
     turned = rays @ R.T @ matrix.T
-    return turned[:, :2] / turned[:, 2:]
+    result: F64 = turned[:, :2] / turned[:, 2:]
+    return result

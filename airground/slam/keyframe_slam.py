@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import KeyframeSlam as Parameters
+from airground.core.arrays import F64
 from airground.core.messages import RobotCalibration
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
@@ -185,7 +185,7 @@ class KeyframeSlam:
         self.adjuster.adjust_all(self.inertial)
         self.state = self.state.following(before, self.map.keyframes[-1].state)
 
-    def make_upright(self, scale: float, R_new_map: NDArray[np.float64]) -> None:
+    def make_upright(self, scale: float, R_new_map: F64) -> None:
         """Scale the map to metres and turn it so that z points up."""
         lever = self.T_rig_camera.translation
         self.map.move(scale, R_new_map, lever)
@@ -209,9 +209,7 @@ class KeyframeSlam:
             self._insert(frame, still=True)
         self.adjust_all()
 
-    def covariance(
-        self, fit: PoseFit, scale_sigma: float, tilt_sigma: float
-    ) -> NDArray[np.float64]:
+    def covariance(self, fit: PoseFit, scale_sigma: float, tilt_sigma: float) -> F64:
         """(6, 6) of the newest pose: that of the image within the map, and of the map."""
         lever = fit.T_map_camera.translation - self.map.keyframes[0].state.position
         within = fit.covariance + self._keyframe_covariance
@@ -240,7 +238,7 @@ class KeyframeSlam:
             self.tracker.ids, self.T_map_camera(), self.parameters.min_points
         )
 
-    def _predict(self, frame: Frame, turn: NDArray[np.float64]) -> Prediction:
+    def _predict(self, frame: Frame, turn: F64) -> Prediction:
         assert self.stamp_ns is not None
         return self.motion.predict(self.state, turn, self.stamp_ns, frame.stamp_ns, self.inertial)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import KeyframeSlam
+from airground.core.arrays import F32, F64, I64, U8, Mask
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam.corners import detect_corners
@@ -44,8 +44,8 @@ class NewKeyframe:
     """
 
     stamp_ns: int
-    image: NDArray[np.uint8]
-    depth: NDArray[np.float32] | None
+    image: U8
+    depth: F32 | None
     state: RigState
     motion: Preintegration | None
     still: bool = False
@@ -85,7 +85,7 @@ class LocalMapper:
         self._max_depth_m = max_depth_m
         self.found_old = False
 
-    def insert(self, new: NewKeyframe, inertial: bool) -> NDArray[np.float64] | None:
+    def insert(self, new: NewKeyframe, inertial: bool) -> F64 | None:
         """Add a keyframe; returns the covariance of its pose where it is known.
 
         Args:
@@ -118,14 +118,15 @@ class LocalMapper:
         self._map.keyframes.append(keyframe)
         return keyframe
 
-    def _inverse_depths(self, new: NewKeyframe, pixels: NDArray) -> NDArray[np.float64]:
+    def _inverse_depths(self, new: NewKeyframe, pixels: F64) -> F64:
         if new.depth is None:
             return np.full(len(pixels), np.nan)
         return inverse_depths_at(new.depth, pixels, self._max_depth_m)
 
-    def _dropped(self, ids: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def _dropped(self, ids: I64) -> Mask:
         states = self._map.states[ids]
-        return (states != CANDIDATE) & ~self._map.mapped(ids)
+        result: Mask = (states != CANDIDATE) & ~self._map.mapped(ids)
+        return result
 
     def _triangulate(self, keyframe: Keyframe) -> None:
         """Place candidates whose rays from first sight and from here cross well."""
@@ -145,7 +146,7 @@ class LocalMapper:
         good &= points.reprojection_px < MAX_TRIANGULATION_ERROR_PX
         self._map.place(ids[good], points.points[good])
 
-    def _cameras(self, keyframes: list[Keyframe]) -> tuple[NDArray, NDArray]:
+    def _cameras(self, keyframes: list[Keyframe]) -> tuple[F64, F64]:
         """(n, 3, 3) and (n, 3) `T_map_camera` of keyframes."""
         T = self._T_rig_camera
         rotations = np.array([k.state.rotation for k in keyframes])
@@ -185,9 +186,7 @@ class LocalMapper:
         )
         return self._take_back(keyframe, new, found, pixels)
 
-    def _take_back(
-        self, keyframe: Keyframe, new: NewKeyframe, ids: NDArray, pixels: NDArray
-    ) -> bool:
+    def _take_back(self, keyframe: Keyframe, new: NewKeyframe, ids: I64, pixels: F32) -> bool:
         """Follow old points again if they agree with each other on where the camera is."""
         if len(ids) < MIN_REUSED:
             return False

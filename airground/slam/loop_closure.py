@@ -7,9 +7,9 @@ is left after a long way through places not seen before.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import KeyframeSlam
+from airground.core.arrays import F32, F64
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam.depth_lookup import inverse_depths_at
@@ -72,7 +72,7 @@ class LoopCloser:
         self._max_depth_m = max_depth_m
         self._passed_over = 0
 
-    def close(self, depth: NDArray[np.float32] | None, inertial: bool) -> bool:
+    def close(self, depth: F32 | None, inertial: bool) -> bool:
         """Look whether the newest keyframe shows an old place; if so, correct the whole map.
 
         Args:
@@ -124,9 +124,7 @@ class LoopCloser:
         drifted = np.linalg.norm(shift) < DRIFT_M + DRIFT_SHARE * way
         return bool(drifted and correction.angle() < MAX_TURN)
 
-    def _correct(
-        self, found: Found, old: int, depth: NDArray[np.float32] | None, inertial: bool
-    ) -> bool:
+    def _correct(self, found: Found, old: int, depth: F32 | None, inertial: bool) -> bool:
         """Pose graph, then bundle adjustment of everything; undone if the loop does not fit."""
         newest = self._map.keyframes[-1]
         before = MapSnapshot.of(self._map)
@@ -146,9 +144,7 @@ class LoopCloser:
         self._tracker.thin(CROWDED * self._parameters.corner_spacing_px)
         return True
 
-    def _inverse_depths(
-        self, found: Found, depth: NDArray[np.float32] | None
-    ) -> NDArray[np.float64]:
+    def _inverse_depths(self, found: Found, depth: F32 | None) -> F64:
         if depth is None:
             return np.full(len(found.ids), np.nan)
         return inverse_depths_at(depth, found.pixels, self._max_depth_m)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import KeyframeSlam
+from airground.core.arrays import F64, I64
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam.bundle_adjustment import (
@@ -78,7 +78,7 @@ class MapAdjuster:
         self._parameters = parameters
         self._inverse_depth_sigma = inverse_depth_sigma
 
-    def adjust_window(self, inertial: bool) -> NDArray[np.float64] | None:
+    def adjust_window(self, inertial: bool) -> F64 | None:
         """Move the newest keyframes and their points; older ones that saw them hold still.
 
         Args:
@@ -100,7 +100,7 @@ class MapAdjuster:
         settings = Settings(self._parameters.iterations, relative_decrease=WINDOW_DECREASE)
         return self._adjust(fixed + free, roles, inertial, settings)
 
-    def adjust_all(self, inertial: bool) -> NDArray[np.float64] | None:
+    def adjust_all(self, inertial: bool) -> F64 | None:
         """Move the whole map.
 
         With an IMU, place and heading of the newest keyframe stay, so that a better vertical
@@ -166,8 +166,8 @@ class MapAdjuster:
         return sorted(int(k) for k in best if shared[k] > 0)
 
     def _adjust(
-        self, chosen: list[int], roles: NDArray, inertial: bool, settings: Settings
-    ) -> NDArray[np.float64] | None:
+        self, chosen: list[int], roles: I64, inertial: bool, settings: Settings
+    ) -> F64 | None:
         moving = [k for k, role in zip(chosen, roles, strict=True) if role != Role.FIXED]
         seen = self._map.seen_by(moving)
         # Seen once in here, a point would go along with that view and say nothing.
@@ -194,7 +194,7 @@ class MapAdjuster:
         self._map.drop(seen[everywhere[seen] < 2])
         return result.covariance
 
-    def _views(self, keyframes: Iterable[int]) -> NDArray[np.int64]:
+    def _views(self, keyframes: Iterable[int]) -> I64:
         """(P,) how many of the keyframes saw each point."""
         views = np.zeros(len(self._map), np.int64)
         for k in keyframes:
@@ -212,9 +212,7 @@ class MapAdjuster:
             still=np.array([self._map.keyframes[k].still for k in chosen]),
         )
 
-    def _observations(
-        self, chosen: list[int], points: NDArray[np.int64]
-    ) -> tuple[Observations, list[NDArray[np.int64]]]:
+    def _observations(self, chosen: list[int], points: I64) -> tuple[Observations, list[I64]]:
         """All sightings of the points, and which rows of each keyframe they are."""
         row_of = np.full(len(self._map), -1)
         row_of[points] = np.arange(len(points))
@@ -231,13 +229,7 @@ class MapAdjuster:
             inverse_depth_sigmas=np.full(len(inverse_depths), self._inverse_depth_sigma),
         ), rows
 
-    def _apply(
-        self,
-        chosen: list[int],
-        points: NDArray[np.int64],
-        rows: list[NDArray[np.int64]],
-        result: Adjustment,
-    ) -> None:
+    def _apply(self, chosen: list[int], points: I64, rows: list[I64], result: Adjustment) -> None:
         """Take over the result and drop the observations that do not fit it."""
         states = result.states
         for n, k in enumerate(chosen):

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from airground.core.arrays import F64, I8, I64
 from airground.slam.rig_state import RigState
 from airground.slam.sparse_map import SparseMap
 
@@ -23,9 +21,9 @@ class MapSnapshot:
     """
 
     states: list[RigState]
-    sightings: list[tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]]
-    positions: NDArray[np.float64]
-    point_states: NDArray[np.int8]
+    sightings: list[tuple[I64, F64, F64]]
+    positions: F64
+    point_states: I8
 
     @classmethod
     def of(cls, sparse_map: SparseMap) -> MapSnapshot:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import Config
+from airground.core.arrays import F64
 from airground.core.messages import ImuSamples, MavImage, RobotCalibration
 from airground.core.trajectory import Trajectory
 from airground.slam.filtered_scale import FilteredScale
@@ -118,7 +118,7 @@ class MonocularSlam:
     def _unknown_scale(self) -> TightScale | FilteredScale:
         return TightScale(self._slam) if self._tight else FilteredScale(self._slam)
 
-    def _covariance(self, fit: PoseFit) -> NDArray[np.float64]:
+    def _covariance(self, fit: PoseFit) -> F64:
         scale = self._scale.estimate
         scale_sigma = min(scale.sigma, 1.0) if scale is not None else 1.0
         return self._slam.covariance(fit, scale_sigma, self._scale.tilt_sigma)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64
 from airground.core.messages import ImuNoise, ImuSamples
 from airground.core.se3 import SE3, nearest_rotation
 from airground.slam.inertial.preintegration import ImuBuffer, Preintegration
@@ -75,12 +75,7 @@ class MotionModel:
         return motion if motion.longest_gap_s <= MAX_GAP_S else None
 
     def predict(
-        self,
-        state: RigState,
-        turn: NDArray[np.float64],
-        start_ns: int,
-        end_ns: int,
-        metric: bool,
+        self, state: RigState, turn: F64, start_ns: int, end_ns: int, metric: bool
     ) -> Prediction:
         """The state at `end_ns`.
 

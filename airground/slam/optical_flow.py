@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+
+from airground.core.arrays import F32, U8, Mask
 
 MAX_DIFFERENCE = 22.0
 """Mean absolute difference of two patches that may still be the same [grey levels]."""
@@ -14,13 +15,8 @@ BORDER_PX = 4.0
 
 
 def flow(
-    image: NDArray[np.uint8],
-    other: NDArray[np.uint8],
-    pixels: NDArray[np.float32],
-    start: NDArray[np.float32],
-    window_px: int,
-    levels: int,
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    image: U8, other: U8, pixels: F32, start: F32, window_px: int, levels: int
+) -> tuple[F32, Mask]:
     """Follow corners from `image` to `other`.
 
     Args:
@@ -56,14 +52,8 @@ def flow(
 
 
 def flow_both_ways(
-    image: NDArray[np.uint8],
-    other: NDArray[np.uint8],
-    pixels: NDArray[np.float32],
-    start: NDArray[np.float32],
-    window_px: int,
-    levels: int,
-    max_return_px: float,
-) -> tuple[NDArray[np.float32], NDArray[np.bool_]]:
+    image: U8, other: U8, pixels: F32, start: F32, window_px: int, levels: int, max_return_px: float
+) -> tuple[F32, Mask]:
     """`flow`, keeping only corners that come back to where they began."""
     there, found = flow(image, other, pixels, start, window_px, levels)
     back, found_back = flow(other, image, there[found], pixels[found], window_px, 0)
@@ -72,7 +62,7 @@ def flow_both_ways(
     return there, found
 
 
-def brightened(image: NDArray[np.uint8], gain: float) -> NDArray[np.uint8]:
+def brightened(image: U8, gain: float) -> U8:
     """`image` times a gain; itself where that hardly changes it."""
     if abs(gain - 1.0) < 0.02:
         return image

@@ -7,7 +7,8 @@ are most of the error.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from airground.core.arrays import F64
 
 MOUNTING_SIGMA = np.deg2rad(0.1)
 """How well a camera's mounting is calibrated, per axis [rad]."""
@@ -17,12 +18,7 @@ LEVEL_SIGMA = np.deg2rad(0.3)
 """How well an accelerometer at rest knows the vertical, per axis: 50 mm/s^2 of bias [rad]."""
 
 
-def with_shared_errors(
-    covariance: NDArray[np.float64],
-    lever: NDArray[np.float64],
-    scale_sigma: float,
-    tilt_sigma: float,
-) -> NDArray[np.float64]:
+def with_shared_errors(covariance: F64, lever: F64, scale_sigma: float, tilt_sigma: float) -> F64:
     """(6, 6) covariance of a pose, errors of the whole map included.
 
     Args:

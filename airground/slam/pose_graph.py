@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from airground.core.arrays import I64
 from airground.core.se3 import SE3, nearest_rotation
 from airground.slam.sparse_map import SparseMap
 
@@ -98,7 +98,7 @@ def optimize(poses: Sequence[SE3], edges: Sequence[Edge]) -> list[SE3]:
     return [SE3(nearest_rotation(pose[:3, :3]), pose[:3, 3]) for pose in found]
 
 
-def covisibility(sparse_map: SparseMap) -> NDArray[np.int64]:
+def covisibility(sparse_map: SparseMap) -> I64:
     """(K, K) how many points of the map two keyframes share."""
     keyframes = sparse_map.keyframes
     seen = [keyframe.ids[sparse_map.mapped(keyframe.ids)] for keyframe in keyframes]
@@ -106,7 +106,8 @@ def covisibility(sparse_map: SparseMap) -> NDArray[np.int64]:
     ids = np.concatenate(seen)
     shape = (len(keyframes), len(sparse_map))
     sees = csr_array((np.ones(len(ids), np.int64), ids, starts), shape=shape)
-    return (sees @ sees.T).toarray()
+    result: I64 = (sees @ sees.T).toarray()
+    return result
 
 
 def _edges(sparse_map: SparseMap, poses: list[SE3]) -> list[Edge]:

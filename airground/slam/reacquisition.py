@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F32, F64, I64, U8, Mask
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3, rotation_angle
 from airground.slam.optical_flow import flow_both_ways
@@ -19,9 +19,7 @@ MAX_RETURN_PX = 0.7
 BORDER_PX = 10
 
 
-def visible(
-    points_map: NDArray[np.float64], T_map_camera: SE3, camera: PinholeCamera
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def visible(points_map: F64, T_map_camera: SE3, camera: PinholeCamera) -> tuple[F64, Mask]:
     """(N, 2) pixels of points and (N,) whether they lie well inside the image."""
     pixels = camera.project(T_map_camera.inverse() @ points_map)
     with np.errstate(invalid="ignore"):
@@ -37,7 +35,7 @@ def keyframes_in_view(
     candidates: Sequence[int],
     T_map_camera: SE3,
     T_rig_camera: SE3,
-    points_in_view: NDArray[np.int64],
+    points_in_view: I64,
     count: int,
     least: int,
     max_turn_deg: float = MAX_TURN_DEG,
@@ -78,12 +76,12 @@ def keyframes_in_view(
 def find_again(
     sparse_map: SparseMap,
     keyframe: int,
-    ids: NDArray[np.int64],
-    image: NDArray[np.uint8],
-    start: NDArray[np.float64],
+    ids: I64,
+    image: U8,
+    start: F64,
     window_px: int,
     levels: int,
-) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+) -> tuple[I64, F32]:
     """Follow points from an old keyframe into an image.
 
     Args:
@@ -110,13 +108,13 @@ def find_again(
 def find_in_keyframes(
     sparse_map: SparseMap,
     keyframes: list[int],
-    ids: NDArray[np.int64],
-    image: NDArray[np.uint8],
-    expected: NDArray[np.float64],
+    ids: I64,
+    image: U8,
+    expected: F64,
     window_px: int,
     levels: int,
     search_px: float = np.inf,
-) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+) -> tuple[I64, F32]:
     """Follow points from several old keyframes into an image, each from the first that has it.
 
     Args:

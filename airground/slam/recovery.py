@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import KeyframeSlam
+from airground.core.arrays import F32, F64, I64, U8
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam.geometry.pose_estimation import PoseFit, estimate_pose
@@ -39,8 +39,8 @@ class Found:
         fit: The camera's pose by them.
     """
 
-    ids: NDArray[np.int64]
-    pixels: NDArray[np.float64]
+    ids: I64
+    pixels: F64
     fit: PoseFit
 
 
@@ -77,11 +77,11 @@ class Recovery:
 
     def near(
         self,
-        image: NDArray[np.uint8],
+        image: U8,
         T_map_camera: SE3,
         turn_known: bool = False,
         among: Sequence[int] | None = None,
-        without: NDArray[np.int64] = NOTHING,
+        without: I64 = NOTHING,
     ) -> Found | None:
         """Look where the map should be if the camera is about there.
 
@@ -104,13 +104,13 @@ class Recovery:
         )
         return self._agreed(again, found, T_map_camera, least, TURN_SIGMA if turn_known else None)
 
-    def anywhere(self, image: NDArray[np.uint8]) -> Found | None:
+    def anywhere(self, image: U8) -> Found | None:
         """Compare the image with all keyframes."""
         found = self._index.find(image, self._camera, self._places)
         # Descriptors find the place, patches the pixel.
         return None if found is None else self.near(image, found.fit.T_map_camera)
 
-    def again(self, among: list[int], without: NDArray[np.int64]) -> Found | None:
+    def again(self, among: list[int], without: I64) -> Found | None:
         """Look for the places of old keyframes in the newest one.
 
         Args:
@@ -128,26 +128,21 @@ class Recovery:
             return None
         return self.near(image, found.fit.T_map_camera, among=among, without=without)
 
-    def _places(self, ids: NDArray[np.int64]) -> NDArray[np.float64]:
+    def _places(self, ids: I64) -> F64:
         """(n, 3) positions of points, NaN where they have none."""
         return np.where(self._map.mapped(ids)[:, None], self._map.positions[ids], np.nan)
 
     def _agreed(
-        self,
-        ids: NDArray,
-        pixels: NDArray,
-        T_map_camera: SE3,
-        least: int,
-        rotation_sigma: float | None,
+        self, ids: I64, pixels: F32, T_map_camera: SE3, least: int, rotation_sigma: float | None
     ) -> Found | None:
         """The pose by points that were found, if they agree."""
         placed = self._map.mapped(ids)
-        ids, pixels = ids[placed], pixels[placed].astype(np.float64)
+        ids, seen = ids[placed], pixels[placed].astype(np.float64)
         if len(ids) < least:
             return None
         fit = estimate_pose(
             self._map.positions[ids],
-            pixels,
+            seen,
             np.full(len(ids), self._parameters.corner_sigma_px),
             self._camera,
             T_map_camera,
@@ -157,4 +152,4 @@ class Recovery:
         good = fit.inliers
         if good.sum() < least or good.mean() < 0.5:
             return None
-        return Found(ids[good], pixels[good], fit)
+        return Found(ids[good], seen[good], fit)

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64
 from airground.core.se3 import SE3, nearest_rotation
 from airground.slam.inertial.stationarity import Rest
 
@@ -22,14 +22,14 @@ class RigState:
         gyro_bias, accelerometer_bias: (3,) [rad/s], [m/s^2].
     """
 
-    rotation: NDArray[np.float64]
-    position: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    gyro_bias: NDArray[np.float64]
-    accelerometer_bias: NDArray[np.float64]
+    rotation: F64
+    position: F64
+    velocity: F64
+    gyro_bias: F64
+    accelerometer_bias: F64
 
     @classmethod
-    def at_origin(cls, rotation: NDArray[np.float64] | None = None) -> RigState:
+    def at_origin(cls, rotation: F64 | None = None) -> RigState:
         """At rest in the map's origin."""
         rotation = np.eye(3) if rotation is None else rotation
         return cls(rotation, *(np.zeros(3) for _ in range(4)))
@@ -55,9 +55,7 @@ class RigState:
         """The same state at another pose."""
         return replace(self, rotation=T_map_rig.rotation, position=T_map_rig.translation)
 
-    def scaled(
-        self, scale: float, rotation: NDArray[np.float64], lever: NDArray[np.float64]
-    ) -> RigState:
+    def scaled(self, scale: float, rotation: F64, lever: F64) -> RigState:
         """The same state after the map was scaled and then turned about its origin.
 
         Args:

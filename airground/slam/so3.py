@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from airground.core.arrays import F64
 
 SMALL_ANGLE_SQUARED = 1e-8
 """Below this, three terms of the series are exact and the closed forms lose digits [rad^2]."""
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def hat(v: NDArray[np.float64]) -> NDArray[np.float64]:
+def hat(v: F64) -> F64:
     """(3, 3) skew matrix with `hat(v) @ x = cross(v, x)`."""
     m = np.zeros((3, 3))
     m[0, 1], m[0, 2], m[1, 2] = -v[2], v[1], -v[0]
@@ -24,7 +25,7 @@ def hat(v: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _combined(v: NDArray, constant: float, linear: float, squared: float) -> NDArray:
+def _combined(v: F64, constant: float, linear: float, squared: float) -> F64:
     """`constant * I + linear * hat(v) + squared * hat(v) @ hat(v)`."""
     x, y, z = v[0], v[1], v[2]
     m = np.empty((3, 3))
@@ -41,7 +42,7 @@ def _combined(v: NDArray, constant: float, linear: float, squared: float) -> NDA
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def exp(v: NDArray[np.float64]) -> NDArray[np.float64]:
+def exp(v: F64) -> F64:
     """(3, 3) rotation by the vector `v` [rad]."""
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
     if square < SMALL_ANGLE_SQUARED:
@@ -52,7 +53,7 @@ def exp(v: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def log(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
+def log(rotation: F64) -> F64:
     """(3,) rotation vector [rad] of a (3, 3) rotation; its length is at most pi."""
     r = rotation
     # Through the quaternion, whose largest component never vanishes: good near 0 and near pi.
@@ -77,12 +78,14 @@ def log(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
     vector = q[1:]
     sine = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
     if sine < 1e-9 * q[0]:
-        return vector * (2.0 / q[0])
-    return vector * (2.0 * np.arctan2(sine, q[0]) / sine)
+        turn: F64 = vector * (2.0 / q[0])
+    else:
+        turn = vector * (2.0 * np.arctan2(sine, q[0]) / sine)
+    return turn
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def right_jacobian(v: NDArray[np.float64]) -> NDArray[np.float64]:
+def right_jacobian(v: F64) -> F64:
     """(3, 3) J with `exp(v + d) = exp(v) @ exp(J @ d)` to first order in d."""
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
     if square < SMALL_ANGLE_SQUARED:
@@ -94,7 +97,7 @@ def right_jacobian(v: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def right_jacobian_inverse(v: NDArray[np.float64]) -> NDArray[np.float64]:
+def right_jacobian_inverse(v: F64) -> F64:
     """(3, 3) J with `log(exp(v) @ exp(d)) = v + J @ d` to first order; |v| below 2 pi."""
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
     if square < SMALL_ANGLE_SQUARED:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64, I64, U8, Floats, Mask
 from airground.core.se3 import SE3
 from airground.slam.inertial.alignment import InertialAlignment
 from airground.slam.inertial.stationarity import Rest
@@ -36,21 +36,21 @@ class Keyframe:
     """
 
     stamp_ns: int
-    image: NDArray[np.uint8]
+    image: U8
     state: RigState
-    ids: NDArray[np.int64]
-    pixels: NDArray[np.float64]
-    inverse_depths: NDArray[np.float64]
+    ids: I64
+    pixels: F64
+    inverse_depths: F64
     still: bool = False
     held: bool = False
 
-    def see(self, ids: NDArray, pixels: NDArray, inverse_depths: NDArray) -> None:
+    def see(self, ids: I64, pixels: F64, inverse_depths: F64) -> None:
         """Add observations of points that this keyframe does not have yet."""
         self.ids = np.concatenate([self.ids, ids])
         self.pixels = np.concatenate([self.pixels, pixels])
         self.inverse_depths = np.concatenate([self.inverse_depths, inverse_depths])
 
-    def forget(self, wrong: NDArray[np.bool_]) -> None:
+    def forget(self, wrong: Mask) -> None:
         """Drop observations, (n,) marked."""
         self.ids = self.ids[~wrong]
         self.pixels = self.pixels[~wrong]
@@ -87,7 +87,7 @@ class SparseMap:
         """Keyframes that were ever made."""
         return len(self.keyframes) + self.culled
 
-    def new_points(self, pixels: NDArray, origin: int) -> NDArray[np.int64]:
+    def new_points(self, pixels: Floats, origin: int) -> I64:
         """Numbers of new candidates, first seen at (n, 2) pixels of keyframe `origin`."""
         count = len(pixels)
         while self._count + count > len(self.states):
@@ -103,16 +103,17 @@ class SparseMap:
         self._count += count
         return ids
 
-    def place(self, ids: NDArray[np.int64], positions: NDArray[np.float64]) -> None:
+    def place(self, ids: I64, positions: F64) -> None:
         """Give candidates a position; from now on they are in the map."""
         self.positions[ids] = positions
         self.states[ids] = MAPPED
 
-    def mapped(self, ids: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def mapped(self, ids: I64) -> Mask:
         """(n,) whether the points are in the map."""
-        return self.states[ids] == MAPPED
+        result: Mask = self.states[ids] == MAPPED
+        return result
 
-    def drop(self, ids: NDArray[np.int64]) -> None:
+    def drop(self, ids: I64) -> None:
         """Take points out for good."""
         self.states[ids] = DROPPED
 
@@ -140,27 +141,25 @@ class SparseMap:
         mapped = gone.ids[self.mapped(gone.ids)]
         self.drop(mapped[views[mapped] < 2])
 
-    def seen_by(self, keyframes: list[int]) -> NDArray[np.int64]:
+    def seen_by(self, keyframes: list[int]) -> I64:
         """Numbers of all points in the map that one of the keyframes saw, sorted."""
         if not keyframes:
             return np.empty(0, np.int64)
         ids = np.unique(np.concatenate([self.keyframes[k].ids for k in keyframes]))
         return ids[self.mapped(ids)]
 
-    def begun_before(self, keyframe: int) -> NDArray[np.int64]:
+    def begun_before(self, keyframe: int) -> I64:
         """Numbers of all points in the map that were first seen earlier than a keyframe."""
         n = self._count
         return np.flatnonzero((self.states[:n] == MAPPED) & (self.origins[:n] < keyframe))
 
-    def shared(self, ids: NDArray[np.int64]) -> NDArray[np.int64]:
+    def shared(self, ids: I64) -> I64:
         """(K,) how many of the points each keyframe saw."""
         wanted = np.zeros(len(self.states), bool)
         wanted[ids] = True
         return np.array([int(wanted[keyframe.ids].sum()) for keyframe in self.keyframes])
 
-    def depth_range(
-        self, ids: NDArray[np.int64], T_map_camera: SE3, least: int
-    ) -> tuple[float, float] | None:
+    def depth_range(self, ids: I64, T_map_camera: SE3, least: int) -> tuple[float, float] | None:
         """Nearest and farthest of the points in a view, along its optical axis [m].
 
         Args:
@@ -194,7 +193,7 @@ class SparseMap:
             moving = replace(standing, velocity=keyframe.state.velocity)
             keyframe.state = standing if keyframe.still else moving
 
-    def move(self, scale: float, rotation: NDArray[np.float64], lever: NDArray[np.float64]) -> None:
+    def move(self, scale: float, rotation: F64, lever: F64) -> None:
         """Scale and turn the whole map about its origin, as `RigState.scaled` does a state."""
         for keyframe in self.keyframes:
             keyframe.state = keyframe.state.scaled(scale, rotation, lever)

@@ -7,9 +7,9 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import KeyframeSlam
+from airground.core.arrays import F64
 from airground.core.messages import RobotCalibration
 from airground.slam.corners import detect_corners
 from airground.slam.feature_tracker import FeatureTracker
@@ -71,7 +71,7 @@ class StandStill:
         self._came_ns = 0
         self._place = np.full(3, np.inf)
 
-    def observe(self, stamp_ns: int, position: NDArray, motion: MotionModel) -> Rest | None:
+    def observe(self, stamp_ns: int, position: F64, motion: MotionModel) -> Rest | None:
         """What the IMU read, if the robot stood at this place for `REST_WINDOW_NS` by now."""
         if motion.buffer is None or self._noise is None:
             return None
@@ -130,9 +130,9 @@ class MovingStart:
     second: Frame
     first_state: RigState
     second_state: RigState
-    pixels_first: NDArray[np.float64]
-    pixels_second: NDArray[np.float64]
-    points_map: NDArray[np.float64]
+    pixels_first: F64
+    pixels_second: F64
+    points_map: F64
 
 
 class TwoViewWait:
@@ -197,7 +197,7 @@ class TwoViewWait:
         self._blind = self._blind + 1 if blind else 0
         self._pass_over = min(max(self._blind - 1, 0), MOST_PASSED_OVER)
 
-    def _turn(self, motion: MotionModel, first: Frame, second: Frame) -> NDArray[np.float64] | None:
+    def _turn(self, motion: MotionModel, first: Frame, second: Frame) -> F64 | None:
         """(3, 3) turn of the rig between two images, by the gyro."""
         moved = motion.preintegrate(first.stamp_ns, second.stamp_ns, RigState.at_origin())
         return None if moved is None else moved.rotation
@@ -207,8 +207,8 @@ class TwoViewWait:
         first: Frame,
         second: Frame,
         start: TwoViewStart,
-        before: NDArray[np.float64],
-        here: NDArray[np.float64],
+        before: F64,
+        here: F64,
         motion: MotionModel,
     ) -> MovingStart:
         assert start.T_a_b is not None

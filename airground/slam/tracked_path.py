@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.slam.sparse_map import Keyframe
@@ -63,9 +63,7 @@ class TrackedPath:
             np.einsum("nij,nj->ni", rotations[row_of], relative[:, :, 3]) + positions[row_of],
         )
 
-    def _where(
-        self, stamps: list[int], keyframes: Sequence[Keyframe]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _where(self, stamps: list[int], keyframes: Sequence[Keyframe]) -> tuple[F64, F64]:
         """(n, 3, 3) and (n, 3) `T_map_rig` of keyframes by their stamps, culled or not."""
         poses = {keyframe.stamp_ns: keyframe.state.pose() for keyframe in keyframes}
         for stamp in stamps:

@@ -4,17 +4,11 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import Config
+from airground.core.arrays import U8
 from airground.core.camera import PinholeCamera
-from airground.core.messages import (
-    GroundImage,
-    ImuNoise,
-    ImuSamples,
-    MavImage,
-    RobotCalibration,
-)
+from airground.core.messages import GroundImage, ImuNoise, ImuSamples, MavImage, RobotCalibration
 from airground.core.se3 import SE3
 from airground.slam.inertial.preintegration import GRAVITY
 from airground.slam.monocular import MonocularSlam
@@ -57,10 +51,11 @@ def warm_up_slam(rng: np.random.Generator) -> None:
     ground.finish()
 
 
-def _texture(rng: np.random.Generator) -> NDArray[np.uint8]:
+def _texture(rng: np.random.Generator) -> U8:
     noise = rng.uniform(0, 255, (480, 640)).astype(np.float32)
     smooth = cv2.GaussianBlur(noise, (0, 0), 2.0)
-    return ((smooth - smooth.min()) * (255 / np.ptp(smooth))).astype(np.uint8)
+    result: U8 = ((smooth - smooth.min()) * (255 / np.ptp(smooth))).astype(np.uint8)
+    return result
 
 
 def _place(t: float) -> float:
@@ -69,7 +64,7 @@ def _place(t: float) -> float:
     return SWING_M * (1 - np.cos(swing * (t - REST_S))) if t > REST_S else 0.0
 
 
-def _image(texture: NDArray[np.uint8], index: int) -> NDArray[np.uint8]:
+def _image(texture: U8, index: int) -> U8:
     if index in DARK:
         return np.zeros((CAMERA.height, CAMERA.width), np.uint8)
     slid_px = 20.0 + _place(index * IMAGE_NS * 1e-9) * CAMERA.fx / HEIGHT_M

@@ -117,12 +117,7 @@ def _fill(
 
 
 def write_all_but_images(
-    root: Path,
-    scene: Scene,
-    seed: int,
-    flight: int,
-    preset: SensorPreset,
-    duration_s: float | None,
+    root: Path, scene: Scene, seed: int, flight: int, preset: SensorPreset, duration_s: float | None
 ) -> tuple[Header, FramePlan]:
     """Simulate a flight and write its samples, lists and truth into an empty folder.
 
@@ -137,11 +132,7 @@ def write_all_but_images(
     world = build_world(scene, seed, pictures=False)
     motion = simulate_motion(world, scene, int(motion_rng.integers(2**63)), duration_s)
     sensors = calibrate(
-        scene.mav.camera_f_px,
-        motion.mav.mounting,
-        motion.ground.mounting,
-        preset,
-        calibration_rng,
+        scene.mav.camera_f_px, motion.mav.mounting, motion.ground.mounting, preset, calibration_rng
     )
     stamps = {
         robot: image_stamps(motion.stamps_ns, first) for robot, first in FIRST_IMAGE_NS.items()
@@ -189,10 +180,7 @@ def image_stamps(motion_stamps_ns: NDArray[np.int64], first_ns: int) -> NDArray[
 
 
 def _samples(
-    stamps_ns: NDArray[np.int64],
-    robot: RobotMotion,
-    preset: SensorPreset,
-    rng: np.random.Generator,
+    stamps_ns: NDArray[np.int64], robot: RobotMotion, preset: SensorPreset, rng: np.random.Generator
 ) -> tuple[ImuSamples, MagneticSamples]:
     ideal = ImuSamples(stamps_ns, robot.gyro_imu, robot.specific_force_imu)
     every = slice(None, None, round(RATE_HZ / MAGNETOMETER_RATE_HZ))

@@ -102,11 +102,7 @@ def planar_path(
 
 
 def heading_path(
-    waypoints: ArrayLike,
-    speed_mps: float,
-    turn_rps: float,
-    start_s: float,
-    rounding_s: float = 0.5,
+    waypoints: ArrayLike, speed_mps: float, turn_rps: float, start_s: float, rounding_s: float = 0.5
 ) -> WaypointPath:
     """A path over (x, y, heading) waypoints that keeps to a speed and a yaw rate.
 

@@ -153,10 +153,7 @@ def ideal_imu(
 
 
 def _hermite(
-    fraction: float,
-    step_s: float,
-    start: tuple[NDArray, NDArray],
-    end: tuple[NDArray, NDArray],
+    fraction: float, step_s: float, start: tuple[NDArray, NDArray], end: tuple[NDArray, NDArray]
 ) -> NDArray:
     """Cubic through (value, rate) at both ends of a step."""
     u = fraction

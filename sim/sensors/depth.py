@@ -24,10 +24,7 @@ _PATCH_PX = 16  # whole patches of a surface seen at a grazing angle vanish toge
 
 
 def kinect_depth(
-    depth: NDArray[np.float32],
-    camera: PinholeCamera,
-    noise: DepthNoise,
-    rng: np.random.Generator,
+    depth: NDArray[np.float32], camera: PinholeCamera, noise: DepthNoise, rng: np.random.Generator
 ) -> NDArray[np.float32]:
     """What a Kinect would measure.
 

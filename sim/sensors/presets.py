@@ -182,9 +182,7 @@ def with_noise(preset: SensorPreset, factor: float) -> SensorPreset:
         ),
         depth=depth
         and replace(
-            depth,
-            axial_scale=factor * depth.axial_scale,
-            lateral_px=factor * depth.lateral_px,
+            depth, axial_scale=factor * depth.axial_scale, lateral_px=factor * depth.lateral_px
         ),
         imu=imu and ImuNoise(**{name: factor * value for name, value in vars(imu).items()}),
     )

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from airground.config import Config
-from airground.core.belief import HeightMap
 from airground.errors import InputError
 from airground.localization import height_map_pair
 from airground.localization.height_map_pair import HeightMapPair
@@ -22,9 +21,8 @@ def clouds():
     return aerial, ground_points(heap, rng, frames=20)
 
 
-def paired(clouds, heading=0.0, ground=None):
-    aerial, seen = clouds
-    ground = seen if ground is None else ground
+def paired(clouds, heading=0.0):
+    aerial, ground = clouds
     return HeightMapPair(7, aerial, POSITION, ground, np.zeros(2), heading, Config())
 
 
@@ -47,11 +45,8 @@ def test_filters_that_share_one_search_once_and_find_the_same(clouds, monkeypatc
         np.testing.assert_array_equal(together, alone)
 
 
-def test_what_cannot_be_used_is_named(clouds):
+def test_an_unknown_heading_is_named(clouds):
     localizer = MonteCarloLocalizer(Config(), np.random.default_rng(0))
     for heading in (None, np.nan):
         with pytest.raises(InputError, match="stamp 7: the heading"):
             list(localizer.update(paired(clouds, heading)))
-    coarse = HeightMap(np.zeros((3, 3), np.float32), np.zeros(2), 10.0)
-    with pytest.raises(InputError, match="10 cells/m, expected 25"):
-        list(localizer.update(paired(clouds, ground=coarse)))

@@ -10,12 +10,4 @@ from airground.slam.bundle_adjustment.problem import (
 )
 from airground.slam.bundle_adjustment.solver import adjust
 
-__all__ = [
-    "Adjustment",
-    "InertialFactor",
-    "Observations",
-    "Role",
-    "Settings",
-    "States",
-    "adjust",
-]
+__all__ = ["Adjustment", "InertialFactor", "Observations", "Role", "Settings", "States", "adjust"]

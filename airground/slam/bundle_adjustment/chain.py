@@ -9,18 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from airground.core.arrays import F64
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def eliminate_chain(
-    chain: NDArray,
-    links: NDArray,
-    coupling: NDArray,
-    gradient: NDArray,
-    poses: NDArray,
-    toward: NDArray,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    chain: F64, links: F64, coupling: F64, gradient: F64, poses: F64, toward: F64
+) -> tuple[F64, F64]:
     """Take velocities and biases out of the poses' equations.
 
     Args:

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from airground.core.arrays import F64, I64
 from airground.slam import so3
 from airground.slam.bundle_adjustment.chain import place
 from airground.slam.bundle_adjustment.problem import InertialFactor
@@ -38,14 +40,14 @@ class PackedMotions:
         whitening: (F, 15, 15) turns a residual into one of unit covariance.
     """
 
-    firsts: NDArray[np.int64]
-    durations: NDArray[np.float64]
-    rotations: NDArray[np.float64]
-    velocities: NDArray[np.float64]
-    positions: NDArray[np.float64]
-    biases: NDArray[np.float64]
-    by_biases: NDArray[np.float64]
-    whitening: NDArray[np.float64]
+    firsts: I64
+    durations: F64
+    rotations: F64
+    velocities: F64
+    positions: F64
+    biases: F64
+    by_biases: F64
+    whitening: F64
 
 
 def pack(factors: Sequence[InertialFactor]) -> PackedMotions:
@@ -82,20 +84,15 @@ def pack(factors: Sequence[InertialFactor]) -> PackedMotions:
     )
 
 
-def _stack(rows: Sequence[ArrayLike], *shape: int) -> NDArray[np.float64]:
+def _stack(rows: Sequence[ArrayLike], *shape: int) -> F64:
     """(F, *shape), also where there are none."""
     return np.array(rows, np.float64).reshape(len(rows), *shape)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def motion_residual(
-    first: NDArray,
-    second: NDArray,
-    R_first: NDArray,
-    R_second: NDArray,
-    motion: tuple,
-    jacobian: NDArray,
-) -> NDArray[np.float64]:
+    first: F64, second: F64, R_first: F64, R_second: F64, motion: tuple[Any, ...], jacobian: F64
+) -> F64:
     """(15,) residual of one motion: rotation, velocity, position, walk of the biases.
 
     Args:
@@ -141,18 +138,18 @@ def motion_residual(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def linearize_motions(
-    firsts: NDArray,
-    durations: NDArray,
-    rotations: NDArray,
-    velocities: NDArray,
-    positions: NDArray,
-    biases: NDArray,
-    by_biases: NDArray,
-    whitening: NDArray,
-    R_map_rig: NDArray,
-    vectors: NDArray,
-    residuals: NDArray,
-    jacobians: NDArray,
+    firsts: I64,
+    durations: F64,
+    rotations: F64,
+    velocities: F64,
+    positions: F64,
+    biases: F64,
+    by_biases: F64,
+    whitening: F64,
+    R_map_rig: F64,
+    vectors: F64,
+    residuals: F64,
+    jacobians: F64,
 ) -> float:
     """The cost of all motions; whitened `residuals` (F, 15) and `jacobians` (F, 15, 30).
 
@@ -167,14 +164,7 @@ def linearize_motions(
     jacobian = np.empty((15, 30))
     for n in range(len(firsts)):
         k = firsts[n]
-        motion = (
-            durations[n],
-            rotations[n],
-            velocities[n],
-            positions[n],
-            biases[n],
-            by_biases[n],
-        )
+        motion = (durations[n], rotations[n], velocities[n], positions[n], biases[n], by_biases[n])
         raw = motion_residual(
             vectors[k], vectors[k + 1], R_map_rig[k], R_map_rig[k + 1], motion, jacobian
         )
@@ -186,16 +176,16 @@ def linearize_motions(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def add_motions(
-    firsts: NDArray,
-    slots: NDArray,
-    residual: NDArray,
-    jacobian: NDArray,
-    poses: NDArray,
-    chain: NDArray,
-    links: NDArray,
-    coupling: NDArray,
-    gradient: NDArray,
-    diagonal: NDArray,
+    firsts: I64,
+    slots: I64,
+    residual: F64,
+    jacobian: F64,
+    poses: F64,
+    chain: F64,
+    links: F64,
+    coupling: F64,
+    gradient: F64,
+    diagonal: F64,
 ) -> None:
     """Add J'J and J'r of the inertial factors."""
     moving = len(chain)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64, I64
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam import so3
@@ -27,9 +27,9 @@ class Estimate:
         points: (P, 3).
     """
 
-    rotations: NDArray[np.float64]
-    vectors: NDArray[np.float64]
-    points: NDArray[np.float64]
+    rotations: F64
+    vectors: F64
+    points: F64
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +44,11 @@ class Linearization:
     """
 
     cost: float
-    visual: NDArray[np.float64]
-    motion_residuals: NDArray[np.float64]
-    motion_jacobians: NDArray[np.float64]
-    prior_residuals: NDArray[np.float64]
-    headings: NDArray[np.float64]
+    visual: F64
+    motion_residuals: F64
+    motion_jacobians: F64
+    prior_residuals: F64
+    headings: F64
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +67,12 @@ class NormalEquations:
         diagonal: (N,) of the Hessian before the points were eliminated.
     """
 
-    poses: NDArray[np.float64]
-    chain: NDArray[np.float64]
-    links: NDArray[np.float64]
-    coupling: NDArray[np.float64]
-    gradient: NDArray[np.float64]
-    diagonal: NDArray[np.float64]
+    poses: F64
+    chain: F64
+    links: F64
+    coupling: F64
+    gradient: F64
+    diagonal: F64
 
 
 class Model:
@@ -93,8 +93,8 @@ class Model:
         self,
         observations: SortedObservations,
         motions: PackedMotions,
-        sharpness: NDArray[np.float64],
-        slots: NDArray[np.int64],
+        sharpness: F64,
+        slots: I64,
         camera: PinholeCamera,
         T_rig_camera: SE3,
         start: Estimate,
@@ -205,9 +205,7 @@ class Model:
         )
         return out
 
-    def moved(
-        self, at: Estimate, linear: Linearization, damping: float, step: NDArray[np.float64]
-    ) -> Estimate:
+    def moved(self, at: Estimate, linear: Linearization, damping: float, step: F64) -> Estimate:
         """The estimate after a step (N,) of the keyframes, its points following."""
         points = np.empty_like(at.points)
         seen = self.observations
@@ -219,12 +217,7 @@ class Model:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _move_keyframes(
-    slots: NDArray,
-    moving: int,
-    inertial: bool,
-    step: NDArray,
-    rotations: NDArray,
-    vectors: NDArray,
+    slots: I64, moving: int, inertial: bool, step: F64, rotations: F64, vectors: F64
 ) -> None:
     """Apply a step to the moving keyframes, in place."""
     for k in range(len(slots)):

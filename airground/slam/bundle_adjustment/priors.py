@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64, I64
 from airground.slam import so3
 from airground.slam.bundle_adjustment.chain import place
 from airground.slam.bundle_adjustment.problem import Role, Settings, States
@@ -17,12 +17,7 @@ GAUGE_SIGMA = 1e-4
 as good as exact, and still well within the range of double precision."""
 
 
-def prior_sharpness(
-    states: States,
-    roles: NDArray[np.int64],
-    firsts: NDArray[np.int64],
-    settings: Settings,
-) -> NDArray[np.float64]:
+def prior_sharpness(states: States, roles: I64, firsts: I64, settings: Settings) -> F64:
     """(K, ROWS) one over the sigma of every prior; 0 where there is none.
 
     Args:
@@ -47,13 +42,13 @@ def prior_sharpness(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def linearize_priors(
-    sharpness: NDArray,
-    start_rotations: NDArray,
-    start_vectors: NDArray,
-    rotations: NDArray,
-    vectors: NDArray,
-    residuals: NDArray,
-    headings: NDArray,
+    sharpness: F64,
+    start_rotations: F64,
+    start_vectors: F64,
+    rotations: F64,
+    vectors: F64,
+    residuals: F64,
+    headings: F64,
 ) -> float:
     """The cost of all priors; whitened `residuals` (K, ROWS) and `headings` (K, 3).
 
@@ -89,14 +84,14 @@ def linearize_priors(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def add_priors(
-    sharpness: NDArray,
-    slots: NDArray,
-    residual: NDArray,
-    headings: NDArray,
-    poses: NDArray,
-    chain: NDArray,
-    gradient: NDArray,
-    diagonal: NDArray,
+    sharpness: F64,
+    slots: I64,
+    residual: F64,
+    headings: F64,
+    poses: F64,
+    chain: F64,
+    gradient: F64,
+    diagonal: F64,
 ) -> None:
     """Add J'J and J'r of the priors."""
     for k in range(len(slots)):

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
-from airground.core.arrays import read_only
+from airground.core.arrays import F64, I64, Mask, read_only
 from airground.slam.inertial.preintegration import Preintegration
 
 
@@ -36,12 +35,12 @@ class States:
         ValueError: A shape is wrong or a number is not finite.
     """
 
-    rotations: NDArray[np.float64]
-    positions: NDArray[np.float64]
-    velocities: NDArray[np.float64]
-    gyro_biases: NDArray[np.float64]
-    accelerometer_biases: NDArray[np.float64]
-    still: NDArray[np.bool_] | None = None
+    rotations: F64
+    positions: F64
+    velocities: F64
+    gyro_biases: F64
+    accelerometer_biases: F64
+    still: Mask | None = None
 
     def __post_init__(self) -> None:
         rotations = read_only(self.rotations, "rotations", (None, 3, 3), np.float64)
@@ -76,12 +75,12 @@ class Observations:
         ValueError: A shape is wrong, a pixel is not finite, or a sigma is not positive.
     """
 
-    keyframes: NDArray[np.int64]
-    points: NDArray[np.int64]
-    pixels: NDArray[np.float64]
-    sigmas_px: NDArray[np.float64]
-    inverse_depths: NDArray[np.float64]
-    inverse_depth_sigmas: NDArray[np.float64]
+    keyframes: I64
+    points: I64
+    pixels: F64
+    sigmas_px: F64
+    inverse_depths: F64
+    inverse_depth_sigmas: F64
 
     def __post_init__(self) -> None:
         m = len(self.keyframes)
@@ -155,12 +154,12 @@ class Adjustment:
     """
 
     states: States
-    points: NDArray[np.float64]
-    residuals_px: NDArray[np.float64]
+    points: F64
+    residuals_px: F64
     cost_before: float
     cost_after: float
     iterations: int
-    covariance: NDArray[np.float64] | None
+    covariance: F64 | None
 
     def __post_init__(self) -> None:
         points = read_only(self.points, "points", (None, 3), np.float64)
@@ -174,8 +173,8 @@ class Adjustment:
 
 def check(
     states: States,
-    roles: NDArray[np.int64],
-    points: NDArray[np.float64],
+    roles: I64,
+    points: F64,
     observations: Observations,
     inertial: Sequence[InertialFactor],
 ) -> None:
@@ -199,6 +198,6 @@ def check(
             )
 
 
-def _first_bad(array: NDArray[np.float64]) -> int:
+def _first_bad(array: F64) -> int:
     finite = np.isfinite(array.reshape(len(array), -1)).all(axis=1)
     return int(np.argmin(finite))

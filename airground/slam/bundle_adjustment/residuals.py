@@ -13,7 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from airground.core.arrays import F64, I64
 
 MIN_DEPTH = 1e-3
 """Nearer than this [m] is behind the camera."""
@@ -23,6 +24,8 @@ but it must not be a bargain either, or steps would turn points behind cameras."
 NUMBERS = 12
 """Of a linearized observation: B (xx, xy, xz, yy, yz, zz), A'Wr (3), d (3)."""
 FASTMATH = {"contract", "reassoc", "arcp", "nsz"}
+
+Triple = tuple[float, float, float]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -36,8 +39,8 @@ def huber(square: float, threshold: float) -> tuple[float, float]:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def camera_poses(
-    rotations: NDArray, positions: NDArray, R_rig_camera: NDArray, t_rig_camera: NDArray
-) -> tuple[NDArray, NDArray]:
+    rotations: F64, positions: F64, R_rig_camera: F64, t_rig_camera: F64
+) -> tuple[F64, F64]:
     """`R_camera_map` (K, 3, 3) and the camera centres (K, 3) in the map."""
     count = len(rotations)
     turned = np.empty((count, 3, 3))
@@ -49,7 +52,7 @@ def camera_poses(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
-def _into_camera(turn: NDArray, point: NDArray, centre: NDArray) -> tuple[float, float, float]:
+def _into_camera(turn: F64, point: F64, centre: F64) -> Triple:
     """A point of the map in a camera that stands at `centre`."""
     x, y, z = point[0] - centre[0], point[1] - centre[1], point[2] - centre[2]
     return (
@@ -60,7 +63,7 @@ def _into_camera(turn: NDArray, point: NDArray, centre: NDArray) -> tuple[float,
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
-def _row(scale: float, along: NDArray, tangent: float, axis: NDArray) -> tuple[float, float, float]:
+def _row(scale: float, along: F64, tangent: float, axis: F64) -> Triple:
     """One row of A: how a pixel coordinate follows the point."""
     return (
         scale * (along[0] - tangent * axis[0]),
@@ -70,7 +73,15 @@ def _row(scale: float, along: NDArray, tangent: float, axis: NDArray) -> tuple[f
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
-def _store(row: NDArray, a: tuple, b: tuple, c: tuple, error: tuple, w: float, q: float) -> None:
+def _store(
+    row: F64,
+    a: Triple,
+    b: Triple,
+    c: Triple,
+    error: Triple,
+    w: float,
+    q: float,
+) -> None:
     """A'WA and A'Wr, A of the rows a and b of weight w and c of weight q, r weighted."""
     row[0] = w * (a[0] * a[0] + b[0] * b[0]) + q * c[0] * c[0]
     row[1] = w * (a[0] * a[1] + b[0] * b[1]) + q * c[0] * c[1]
@@ -85,16 +96,16 @@ def _store(row: NDArray, a: tuple, b: tuple, c: tuple, error: tuple, w: float, q
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def linearize(
-    keyframes: NDArray,
-    points_seen: NDArray,
-    measured: NDArray,
-    positions: NDArray,
-    R_camera_map: NDArray,
-    centres: NDArray,
-    points: NDArray,
-    camera: NDArray,
+    keyframes: I64,
+    points_seen: I64,
+    measured: F64,
+    positions: F64,
+    R_camera_map: F64,
+    centres: F64,
+    points: F64,
+    camera: F64,
     threshold: float,
-    out: NDArray,
+    out: F64,
 ) -> float:
     """The cost of all observations, and in `out` (M, NUMBERS) their linearization.
 
@@ -145,14 +156,14 @@ def linearize(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def reprojection_errors_px(
-    keyframes: NDArray,
-    points_seen: NDArray,
-    pixels: NDArray,
-    R_camera_map: NDArray,
-    centres: NDArray,
-    points: NDArray,
-    camera: NDArray,
-) -> NDArray[np.float64]:
+    keyframes: I64,
+    points_seen: I64,
+    pixels: F64,
+    R_camera_map: F64,
+    centres: F64,
+    points: F64,
+    camera: F64,
+) -> F64:
     """(M,) distance of each point from where it was seen [px]; NaN behind the camera."""
     errors = np.full(len(keyframes), np.nan)
     for m in range(len(keyframes)):

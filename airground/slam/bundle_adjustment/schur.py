@@ -7,9 +7,9 @@ Section 6.1, with the Jacobians factored as in `residuals`.
 from __future__ import annotations
 
 from numba import njit
-from numpy.typing import NDArray
 
-from airground.slam.bundle_adjustment.residuals import FASTMATH
+from airground.core.arrays import F64, I64
+from airground.slam.bundle_adjustment.residuals import FASTMATH, Triple
 
 FLOOR = 1e-10
 """Least damping of a point, as a share of the trace of its block: a single ray, or rays that
@@ -18,7 +18,7 @@ are all but parallel, leave the depth open, and to any other point this is as go
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def _point_block(
-    linear: NDArray, start: int, stop: int, damping: float
+    linear: F64, start: int, stop: int, damping: float
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
     """Inverse of a point's damped block (xx, xy, xz, yy, yz, zz) and its gradient."""
     xx = xy = xz = yy = yz = zz = g0 = g1 = g2 = 0.0
@@ -56,16 +56,12 @@ def _point_block(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
-def _cross(
-    a0: float, a1: float, a2: float, b0: float, b1: float, b2: float
-) -> tuple[float, float, float]:
+def _cross(a0: float, a1: float, a2: float, b0: float, b1: float, b2: float) -> Triple:
     return a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
-def _times_symmetric(
-    v0: float, v1: float, v2: float, row: NDArray | tuple
-) -> tuple[float, float, float]:
+def _times_symmetric(v0: float, v1: float, v2: float, row: F64 | tuple[float, ...]) -> Triple:
     """v' B for the symmetric B (xx, xy, xz, yy, yz, zz) that begins `row`."""
     return (
         v0 * row[0] + v1 * row[1] + v2 * row[2],
@@ -75,7 +71,7 @@ def _times_symmetric(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
-def _add_block(hessian: NDArray, r: int, c: int, m: tuple, d: tuple, e: tuple) -> None:
+def _add_block(hessian: F64, r: int, c: int, m: tuple[float, ...], d: Triple, e: Triple) -> None:
     """Add G_d' M G_e, with G_d = [hat(d), -I], at row r and column c."""
     m00, m01, m02, m10, m11, m12, m20, m21, m22 = m
     d0, d1, d2 = d
@@ -99,9 +95,7 @@ def _add_block(hessian: NDArray, r: int, c: int, m: tuple, d: tuple, e: tuple) -
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
-def _add_row(
-    row: NDArray, v0: float, v1: float, v2: float, v3: float, v4: float, v5: float
-) -> None:
+def _add_row(row: F64, v0: float, v1: float, v2: float, v3: float, v4: float, v5: float) -> None:
     row[0] += v0
     row[1] += v1
     row[2] += v2
@@ -111,7 +105,7 @@ def _add_row(
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
-def _add_diagonal(diagonal: NDArray, s: int, row: NDArray) -> None:
+def _add_diagonal(diagonal: F64, s: int, row: F64) -> None:
     """The diagonal of G' B G before any point is eliminated: what damping scales with."""
     d0, d1, d2 = row[9], row[10], row[11]
     diagonal[s] += row[3] * d2 * d2 - 2.0 * row[4] * d1 * d2 + row[5] * d1 * d1
@@ -124,13 +118,7 @@ def _add_diagonal(diagonal: NDArray, s: int, row: NDArray) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def eliminate_points(
-    linear: NDArray,
-    starts: NDArray,
-    slots: NDArray,
-    damping: float,
-    hessian: NDArray,
-    gradient: NDArray,
-    diagonal: NDArray,
+    linear: F64, starts: I64, slots: I64, damping: float, hessian: F64, gradient: F64, diagonal: F64
 ) -> None:
     """Add what the observations say about the poses, their points eliminated.
 
@@ -185,13 +173,7 @@ def eliminate_points(
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FASTMATH)
 def move_points(
-    linear: NDArray,
-    starts: NDArray,
-    slots: NDArray,
-    damping: float,
-    step: NDArray,
-    points: NDArray,
-    moved: NDArray,
+    linear: F64, starts: I64, slots: I64, damping: float, step: F64, points: F64, moved: F64
 ) -> None:
     """Points (P, 3) [m] after the keyframes took `step` (N,), into `moved`."""
     for j in range(len(starts) - 1):

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotrs
 
+from airground.core.arrays import F64, I64
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam.bundle_adjustment import inertial_residuals, residuals
@@ -41,8 +41,8 @@ scale of a map without IMU and depth, say, which only rounding and damping hold.
 
 def adjust(
     states: States,
-    roles: NDArray[np.int64],
-    points: NDArray[np.float64],
+    roles: I64,
+    points: F64,
     observations: Observations,
     inertial: Sequence[InertialFactor],
     camera: PinholeCamera,
@@ -88,8 +88,8 @@ def adjust(
 
 def prepare(
     states: States,
-    roles: NDArray[np.int64],
-    points: NDArray[np.float64],
+    roles: I64,
+    points: F64,
     observations: Observations,
     inertial: Sequence[InertialFactor],
     camera: PinholeCamera,
@@ -146,7 +146,7 @@ def _descend(
     return best, linear, cost_before, tried
 
 
-def solve(equations: NormalEquations, damping: float) -> NDArray[np.float64] | None:
+def solve(equations: NormalEquations, damping: float) -> F64 | None:
     """(N,) step of the keyframes; None where the matrix is not positive definite."""
     reduced = _reduce(equations, damping)
     if reduced is None:
@@ -156,9 +156,7 @@ def solve(equations: NormalEquations, damping: float) -> NDArray[np.float64] | N
     return np.concatenate([poses, -(offset + spread @ poses).ravel()])
 
 
-def _reduce(
-    equations: NormalEquations, damping: float
-) -> tuple[NDArray, NDArray, NDArray, NDArray] | None:
+def _reduce(equations: NormalEquations, damping: float) -> tuple[F64, F64, F64, F64] | None:
     """Cholesky factor and gradient of the poses alone, Z and z of `eliminate_chain`.
 
     Overwrites the equations. None where the matrix is not positive definite.
@@ -188,14 +186,12 @@ def _reduce(
     return None if failed else (lower, toward, spread, offset)
 
 
-def _back(lower: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+def _back(lower: F64, right: F64) -> F64:
     """Solve with the factor."""
     return dpotrs(lower, right, lower=1)[0] if len(right) else right
 
 
-def _last_covariance(
-    model: Model, linear: Linearization, free_slots: NDArray[np.int64]
-) -> NDArray[np.float64] | None:
+def _last_covariance(model: Model, linear: Linearization, free_slots: I64) -> F64 | None:
     """(6, 6) of position and rotation of the last free keyframe."""
     if not len(free_slots):
         return None
@@ -210,10 +206,11 @@ def _last_covariance(
     covariance = _back(reduced[0], units)[unknowns]
     if not ((alone > 0.0) & (np.diag(covariance) * alone < OPEN)).all():
         return None
-    return 0.5 * (covariance + covariance.T)
+    result: F64 = 0.5 * (covariance + covariance.T)
+    return result
 
 
-def _estimate(states: States, points: NDArray[np.float64]) -> Estimate:
+def _estimate(states: States, points: F64) -> Estimate:
     vectors = np.concatenate(
         [states.positions, states.velocities, states.gyro_biases, states.accelerometer_biases],
         axis=1,
@@ -226,9 +223,7 @@ def _states(estimate: Estimate, before: States) -> States:
     return States(estimate.rotations, positions, velocities, gyro, accelerometer, before.still)
 
 
-def _residuals_px(
-    model: Model, estimate: Estimate, observations: Observations
-) -> NDArray[np.float64]:
+def _residuals_px(model: Model, estimate: Estimate, observations: Observations) -> F64:
     """In the order the caller gave the observations in."""
     positions = np.ascontiguousarray(estimate.vectors[:, 0:3])
     poses = residuals.camera_poses(

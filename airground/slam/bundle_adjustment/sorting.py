@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64, I64
 from airground.slam.bundle_adjustment.problem import Observations
 
 
@@ -22,15 +22,15 @@ class SortedObservations:
         starts: (P + 1,) first observation of each point.
     """
 
-    keyframes: NDArray[np.int64]
-    points: NDArray[np.int64]
-    slots: NDArray[np.int64]
-    measured: NDArray[np.float64]
-    starts: NDArray[np.int64]
+    keyframes: I64
+    points: I64
+    slots: I64
+    measured: F64
+    starts: I64
 
 
 def sort_observations(
-    observations: Observations, slot_of: NDArray[np.int64], point_count: int
+    observations: Observations, slot_of: I64, point_count: int
 ) -> SortedObservations:
     """Sort; `slot_of` (K,) is -1 for keyframes that do not move.
 
@@ -53,9 +53,7 @@ def sort_observations(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _order(
-    keyframes: NDArray, points: NDArray, slot_of: NDArray, point_count: int
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _order(keyframes: I64, points: I64, slot_of: I64, point_count: int) -> tuple[I64, I64]:
     """Two stable counting sorts, by slot and then by point, and where each point starts."""
     count = len(keyframes)
     by_slot, _ = _counting_sort(slot_of[keyframes] + 1, len(slot_of) + 1, np.arange(count))
@@ -63,9 +61,7 @@ def _order(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _counting_sort(
-    keys: NDArray, key_count: int, order: NDArray
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _counting_sort(keys: I64, key_count: int, order: I64) -> tuple[I64, I64]:
     """`order` sorted by the keys of what it names, and where each key starts (and the end)."""
     starts = np.zeros(key_count + 1, np.int64)
     for key in keys:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+
+from airground.core.arrays import F64
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def solve(H: NDArray, g: NDArray) -> tuple[NDArray, bool]:
+def solve(H: F64, g: F64) -> tuple[F64, bool]:
     """x with H x = g by Cholesky, and whether H is positive definite."""
     n = len(g)
     L, x = np.zeros((n, n)), g.copy()
@@ -36,7 +37,7 @@ def solve(H: NDArray, g: NDArray) -> tuple[NDArray, bool]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def inverse(H: NDArray) -> NDArray:
+def inverse(H: F64) -> F64:
     """Inverse of a positive definite matrix; NaN if it is not."""
     result = np.full(H.shape, np.nan)
     for j in range(len(H)):
@@ -46,4 +47,5 @@ def inverse(H: NDArray) -> NDArray:
         if not solved:
             return np.full(H.shape, np.nan)
         result[:, j] = column
-    return 0.5 * (result + result.T)
+    symmetric: F64 = 0.5 * (result + result.T)
+    return symmetric

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from airground.core.arrays import read_only
+from airground.core.arrays import F64, I64, U8, U64, Floats, read_only
 
 SCALE = 1.5
 """Images are reduced by this much first: less noise, and a patch that tells more."""
@@ -37,8 +36,8 @@ class Described:
         descriptors: (n, 4) uint64, 256 bits each.
     """
 
-    pixels: NDArray[np.float64]
-    descriptors: NDArray[np.uint64]
+    pixels: F64
+    descriptors: U64
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pixels", read_only(self.pixels, "pixels", (None, 2), np.float64))
@@ -47,7 +46,7 @@ class Described:
         object.__setattr__(self, "descriptors", descriptors)
 
 
-def describe(image: NDArray[np.uint8], pixels: NDArray) -> Described:
+def describe(image: U8, pixels: Floats) -> Described:
     """ORB descriptors at pixels of a grey image.
 
     Args:
@@ -55,7 +54,7 @@ def describe(image: NDArray[np.uint8], pixels: NDArray) -> Described:
         pixels: (n, 2), inside the image.
     """
     size = (round(image.shape[1] / SCALE), round(image.shape[0] / SCALE))
-    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    small = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
     pixels = np.asarray(pixels, np.float64).reshape(-1, 2)
     at = (pixels + 0.5) / SCALE - 0.5
     angles = np.rad2deg(_directions(small, at))
@@ -73,7 +72,7 @@ def describe(image: NDArray[np.uint8], pixels: NDArray) -> Described:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _directions(image: NDArray, pixels: NDArray) -> NDArray:
+def _directions(image: U8, pixels: F64) -> F64:
     """(n,) angle [rad] in [0, 2 pi) from a disc's centre to its centroid of intensity."""
     height, width = image.shape
     angles = np.empty(len(pixels))
@@ -93,7 +92,7 @@ def _directions(image: NDArray, pixels: NDArray) -> NDArray:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def hamming(a: NDArray, b: NDArray) -> int:
+def hamming(a: U64, b: U64) -> int:
     """Number of different bits of two (4,) uint64 descriptors."""
     total = np.uint64(0)
     for i in range(4):
@@ -107,9 +106,7 @@ def hamming(a: NDArray, b: NDArray) -> int:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def match(
-    query: NDArray[np.uint64], known: NDArray[np.uint64]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def match(query: U64, known: U64) -> tuple[I64, I64]:
     """Pairs of rows that are nearest to each other and clearly nearer than the next.
 
     Args:
@@ -146,9 +143,7 @@ def match(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def votes(
-    query: NDArray[np.uint64], known: NDArray[np.uint64], starts: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def votes(query: U64, known: U64, starts: I64) -> I64:
     """How many query descriptors have a likeness in each group of known ones.
 
     Args:

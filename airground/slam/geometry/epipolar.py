@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64, I64, Mask
 from airground.slam import so3
 from airground.slam.geometry.cholesky import inverse, solve
 
@@ -24,13 +24,13 @@ MAX_CHI2 = 3.84
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def essential(R: NDArray, t: NDArray) -> NDArray:
+def essential(R: F64, t: F64) -> F64:
     """E with ray_a^T E ray_b = 0 for T_a_b = (R, t)."""
     return so3.hat(t) @ R
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def sampson(E: NDArray, ua: float, va: float, ub: float, vb: float) -> float:
+def sampson(E: F64, ua: float, va: float, ub: float, vb: float) -> float:
     """Signed first-order distance of two rays from meeting, in units of u and v."""
     lx = E[0, 0] * ub + E[0, 1] * vb + E[0, 2]
     ly = E[1, 0] * ub + E[1, 1] * vb + E[1, 2]
@@ -38,18 +38,14 @@ def sampson(E: NDArray, ua: float, va: float, ub: float, vb: float) -> float:
     mx = E[0, 0] * ua + E[1, 0] * va + E[2, 0]
     my = E[0, 1] * ua + E[1, 1] * va + E[2, 1]
     norm = np.sqrt(lx * lx + ly * ly + mx * mx + my * my)
-    return (ua * lx + va * ly + lz) / norm
+    result: float = (ua * lx + va * ly + lz) / norm
+    return result
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def direction_by_two_rays(
-    rays_a: NDArray,
-    rays_b: NDArray,
-    R: NDArray,
-    first: NDArray,
-    second: NDArray,
-    sigma: float,
-) -> NDArray:
+    rays_a: F64, rays_b: F64, R: F64, first: I64, second: I64, sigma: float
+) -> F64:
     """RANSAC over the direction of translation when the rotation is known.
 
     Each pair of rays spans a plane that holds the translation; two planes cross in it.
@@ -93,14 +89,14 @@ def direction_by_two_rays(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def refine(
-    rays_a: NDArray,
-    rays_b: NDArray,
-    R0: NDArray,
-    t0: NDArray,
+    rays_a: F64,
+    rays_b: F64,
+    R0: F64,
+    t0: F64,
     start_sigma: float,
     sigma: float,
     rotation_sigma: float,
-) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+) -> tuple[F64, F64, Mask, F64]:
     """Least Sampson residuals of the inliers over rotation and direction of translation.
 
     Args:
@@ -124,7 +120,7 @@ def refine(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _choose(rays_a: NDArray, rays_b: NDArray, R: NDArray, t: NDArray, sigma: float) -> NDArray:
+def _choose(rays_a: F64, rays_b: F64, R: F64, t: F64, sigma: float) -> Mask:
     """Which pairs of rays meet within 1.96 sigma."""
     E = essential(R, t)
     inliers = np.zeros(len(rays_a), np.bool_)
@@ -136,15 +132,15 @@ def _choose(rays_a: NDArray, rays_b: NDArray, R: NDArray, t: NDArray, sigma: flo
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _descend(
-    rays_a: NDArray,
-    rays_b: NDArray,
-    inliers: NDArray,
-    R: NDArray,
-    t: NDArray,
-    R0: NDArray,
+    rays_a: F64,
+    rays_b: F64,
+    inliers: Mask,
+    R: F64,
+    t: F64,
+    R0: F64,
     sigma: float,
     rotation_sigma: float,
-) -> tuple[NDArray, NDArray]:
+) -> tuple[F64, F64]:
     """Levenberg-Marquardt with Huber's cost."""
     damping = 1e-4
     H, g, cost = _normal_equations(rays_a, rays_b, inliers, R, t, R0, sigma, rotation_sigma)
@@ -173,15 +169,15 @@ def _descend(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _normal_equations(
-    rays_a: NDArray,
-    rays_b: NDArray,
-    inliers: NDArray,
-    R: NDArray,
-    t: NDArray,
-    R0: NDArray,
+    rays_a: F64,
+    rays_b: F64,
+    inliers: Mask,
+    R: F64,
+    t: F64,
+    R0: F64,
     sigma: float,
     rotation_sigma: float,
-) -> tuple[NDArray, NDArray, float]:
+) -> tuple[F64, F64, float]:
     """J^T W J (5, 5), -J^T W r (5,) and Huber's cost; derivatives by central differences."""
     plus, minus = np.empty((5, 3, 3)), np.empty((5, 3, 3))
     for j in range(5):
@@ -214,7 +210,7 @@ def _normal_equations(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _moved(R: NDArray, t: NDArray, delta: NDArray) -> tuple[NDArray, NDArray]:
+def _moved(R: F64, t: F64, delta: F64) -> tuple[F64, F64]:
     """(R, t) turned: t by two angles across itself, R by a rotation vector on the left."""
     smallest = np.argmin(np.abs(t))
     axis = np.zeros(3)

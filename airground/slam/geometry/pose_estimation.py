@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from airground.core.arrays import read_only
+from airground.core.arrays import F64, Mask, read_only
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3, nearest_rotation
 from airground.slam import so3
@@ -42,9 +41,9 @@ class PoseFit:
     """
 
     T_map_camera: SE3
-    inliers: NDArray[np.bool_]
+    inliers: Mask
     rms_px: float
-    covariance: NDArray[np.float64]
+    covariance: F64
     iterations: int
 
     def __post_init__(self) -> None:
@@ -54,14 +53,14 @@ class PoseFit:
 
 
 def estimate_pose(
-    points_map: NDArray[np.float64],
-    pixels: NDArray[np.float64],
-    sigmas_px: NDArray[np.float64],
+    points_map: F64,
+    pixels: F64,
+    sigmas_px: F64,
     camera: PinholeCamera,
     T_map_camera_start: SE3,
     *,
-    inverse_depths: NDArray[np.float64] | None = None,
-    inverse_depth_sigmas: NDArray[np.float64] | None = None,
+    inverse_depths: F64 | None = None,
+    inverse_depth_sigmas: F64 | None = None,
     rotation_sigma: float | None = None,
     position_sigma: float | None = None,
     huber: float = 1.5,
@@ -113,8 +112,8 @@ def estimate_pose(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _fit(
-    observed: NDArray, k: NDArray, R0: NDArray, p0: NDArray, prior: NDArray, huber: float
-) -> tuple[NDArray, NDArray, NDArray, float, NDArray, int]:
+    observed: F64, k: F64, R0: F64, p0: F64, prior: F64, huber: float
+) -> tuple[F64, F64, Mask, float, F64, int]:
     n = len(observed)
     use_pixel, use_depth = np.ones(n, np.bool_), np.isfinite(observed[:, 6])
     R, p, steps = _descend(
@@ -133,18 +132,18 @@ def _fit(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _descend(
-    observed: NDArray,
-    k: NDArray,
-    R: NDArray,
-    p: NDArray,
-    R0: NDArray,
-    p0: NDArray,
-    prior: NDArray,
+    observed: F64,
+    k: F64,
+    R: F64,
+    p: F64,
+    R0: F64,
+    p0: F64,
+    prior: F64,
     huber: float,
-    use_pixel: NDArray,
-    use_depth: NDArray,
+    use_pixel: Mask,
+    use_depth: Mask,
     iterations: int,
-) -> tuple[NDArray, NDArray, int]:
+) -> tuple[F64, F64, int]:
     """Levenberg-Marquardt: R <- exp(phi) @ R, p <- p + dp."""
     damping = 1e-6
     H, g, cost = _normal_equations(observed, k, R, p, R0, p0, prior, huber, use_pixel, use_depth)
@@ -173,17 +172,17 @@ def _descend(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _normal_equations(
-    observed: NDArray,
-    k: NDArray,
-    R: NDArray,
-    p: NDArray,
-    R0: NDArray,
-    p0: NDArray,
-    prior: NDArray,
+    observed: F64,
+    k: F64,
+    R: F64,
+    p: F64,
+    R0: F64,
+    p0: F64,
+    prior: F64,
     huber: float,
-    use_pixel: NDArray,
-    use_depth: NDArray,
-) -> tuple[NDArray, NDArray, float]:
+    use_pixel: Mask,
+    use_depth: Mask,
+) -> tuple[F64, F64, float]:
     """J^T W J (6, 6), -J^T W r (6,) and the cost, for (position, left rotation)."""
     H, g, cost = np.zeros((6, 6)), np.zeros(6), 0.0
     row = np.empty(6)
@@ -235,13 +234,12 @@ def _huber_cost(square: float, huber: float) -> float:
     """Squared up to `huber`, linear beyond."""
     if square <= huber * huber:
         return square
-    return 2.0 * huber * np.sqrt(square) - huber * huber
+    result: float = 2.0 * huber * np.sqrt(square) - huber * huber
+    return result
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _row(
-    row: NDArray, R: NDArray, d0: float, d1: float, d2: float, a: float, b: float, c: float
-) -> None:
+def _row(row: F64, R: F64, d0: float, d1: float, d2: float, a: float, b: float, c: float) -> None:
     """Derivative of a residual whose derivative by the point in the camera is (a, b, c).
 
     The point R^T (X - p) moves by -R^T with p and by R^T hat(X - p) with a left turn.
@@ -256,7 +254,7 @@ def _row(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _add(H: NDArray, g: NDArray, row: NDArray, residual: float, weight: float) -> None:
+def _add(H: F64, g: F64, row: F64, residual: float, weight: float) -> None:
     """Add one weighted residual to the upper triangle of H and to g."""
     for j in range(6):
         scaled = weight * row[j]
@@ -266,9 +264,7 @@ def _add(H: NDArray, g: NDArray, row: NDArray, residual: float, weight: float) -
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _classify(
-    observed: NDArray, k: NDArray, R: NDArray, p: NDArray, use_pixel: NDArray, use_depth: NDArray
-) -> float:
+def _classify(observed: F64, k: F64, R: F64, p: F64, use_pixel: Mask, use_depth: Mask) -> float:
     """Mark pixels and depths that agree with a pose; returns the inliers' squared px."""
     total = 0.0
     for i in range(len(observed)):

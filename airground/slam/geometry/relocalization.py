@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
-from airground.core.arrays import read_only
+from airground.core.arrays import F64, I64, U8, U64, Floats, read_only
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3, nearest_rotation
 from airground.slam.corners import detect_corners
@@ -43,8 +42,8 @@ class Matches:
         pixels: (n, 2) where they are in the image, good to 1 to 2 px.
     """
 
-    point_ids: NDArray[np.int64]
-    pixels: NDArray[np.float64]
+    point_ids: I64
+    pixels: F64
 
     def __post_init__(self) -> None:
         point_ids = read_only(self.point_ids, "point_ids", (None,), np.int64)
@@ -72,19 +71,13 @@ class KeyframeIndex:
     """What map points look like in each keyframe: 32 bytes a point, no vocabulary."""
 
     def __init__(self) -> None:
-        self._point_ids: dict[int, NDArray[np.int64]] = {}
-        self._descriptors: dict[int, NDArray[np.uint64]] = {}
+        self._point_ids: dict[int, I64] = {}
+        self._descriptors: dict[int, U64] = {}
 
     def __len__(self) -> int:
         return len(self._point_ids)
 
-    def add(
-        self,
-        keyframe_id: int,
-        image: NDArray[np.uint8],
-        point_ids: NDArray[np.int64],
-        pixels: NDArray,
-    ) -> None:
+    def add(self, keyframe_id: int, image: U8, point_ids: I64, pixels: Floats) -> None:
         """Remember a keyframe; one added before under the same number is replaced.
 
         Args:
@@ -135,9 +128,9 @@ class KeyframeIndex:
 
     def find(
         self,
-        image: NDArray[np.uint8],
+        image: U8,
         camera: PinholeCamera,
-        points: Callable[[NDArray[np.int64]], NDArray[np.float64]],
+        points: Callable[[I64], F64],
         among: list[int] | None = None,
     ) -> Relocalization | None:
         """Where an image was taken; None where no keyframe tells beyond doubt.
@@ -161,15 +154,13 @@ class KeyframeIndex:
         return max(found, key=lambda place: int(place.fit.inliers.sum()), default=None)
 
 
-def describe_corners(image: NDArray[np.uint8]) -> Described:
+def describe_corners(image: U8) -> Described:
     """Corners of an image, strongest first, with their descriptors."""
     nothing = np.empty((0, 2), np.float32)
     return describe(image, detect_corners(image, nothing, CORNERS, CORNER_SPACING_PX))
 
 
-def pose_from_matches(
-    points_map: NDArray[np.float64], pixels: NDArray[np.float64], camera: PinholeCamera
-) -> PoseFit | None:
+def pose_from_matches(points_map: F64, pixels: F64, camera: PinholeCamera) -> PoseFit | None:
     """The pose that enough matches agree on, over enough of the image; None without one.
 
     Args:

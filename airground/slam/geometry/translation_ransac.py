@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64, I64, Mask
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3, nearest_rotation
 
@@ -15,14 +15,14 @@ REFINEMENTS = 4
 
 
 def translation_by_known_rotation(
-    points_map: NDArray[np.float64],
-    pixels: NDArray[np.float64],
+    points_map: F64,
+    pixels: F64,
     camera: PinholeCamera,
-    R_map_camera: NDArray[np.float64],
+    R_map_camera: F64,
     threshold_px: float,
     iterations: int,
     rng: np.random.Generator,
-) -> tuple[SE3 | None, NDArray[np.bool_]]:
+) -> tuple[SE3 | None, Mask]:
     """RANSAC over the camera's position, then least squares over the inliers.
 
     Args:
@@ -56,8 +56,8 @@ def translation_by_known_rotation(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _consensus(
-    points: NDArray, rays: NDArray, first: NDArray, second: NDArray, threshold: float
-) -> tuple[NDArray, NDArray]:
+    points: F64, rays: F64, first: I64, second: I64, threshold: float
+) -> tuple[F64, Mask]:
     n = len(points)
     limit = threshold * threshold
     best, best_cost = np.full(3, np.nan), np.inf
@@ -84,18 +84,19 @@ def _consensus(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _square(points: NDArray, rays: NDArray, i: int, centre: NDArray) -> float:
+def _square(points: F64, rays: F64, i: int, centre: F64) -> float:
     """Squared distance of a ray from its point's projection; infinite behind the camera."""
     z = points[i, 2] - centre[2]
     if not z > 0.0:
         return np.inf
     u = (points[i, 0] - centre[0]) / z - rays[i, 0]
     v = (points[i, 1] - centre[1]) / z - rays[i, 1]
-    return u * u + v * v
+    result: float = u * u + v * v
+    return result
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _two_points(points: NDArray, rays: NDArray, i: int, j: int) -> NDArray:
+def _two_points(points: F64, rays: F64, i: int, j: int) -> F64:
     """The position c with c_xy - ray * c_z = point_xy - ray * point_z, least squares of four."""
     ui, vi, uj, vj = rays[i, 0], rays[i, 1], rays[j, 0], rays[j, 1]
     ai, bi = points[i, 0] - ui * points[i, 2], points[i, 1] - vi * points[i, 2]
@@ -110,7 +111,7 @@ def _two_points(points: NDArray, rays: NDArray, i: int, j: int) -> NDArray:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _least_squares(points: NDArray, rays: NDArray, inliers: NDArray, z: float) -> NDArray:
+def _least_squares(points: F64, rays: F64, inliers: Mask, z: float) -> F64:
     """The same over all inliers; weights 1 / depth^2 turn metres into the image's errors."""
     total, su, sv, sa, sb = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(len(points)):

@@ -6,15 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from airground.core.arrays import read_only
+from airground.core.arrays import F64, Mask, read_only
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 
 ITERATIONS = 3
 
-Poses = SE3 | tuple[NDArray[np.float64], NDArray[np.float64]]
+Poses = SE3 | tuple[F64, F64]
 """One `T_map_camera` for all points, or rotations (N, 3, 3) and positions (N, 3)."""
 
 
@@ -32,12 +31,12 @@ class Triangulated:
         good: (N,) bool, whether the rays cross in front of both cameras.
     """
 
-    points: NDArray[np.float64]
-    depth_a: NDArray[np.float64]
-    inverse_depth_sigma: NDArray[np.float64]
-    parallax_rad: NDArray[np.float64]
-    reprojection_px: NDArray[np.float64]
-    good: NDArray[np.bool_]
+    points: F64
+    depth_a: F64
+    inverse_depth_sigma: F64
+    parallax_rad: F64
+    reprojection_px: F64
+    good: Mask
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", read_only(self.points, "points", (None, 3), np.float64))
@@ -49,11 +48,7 @@ class Triangulated:
 
 
 def triangulate_pairs(
-    T_map_a: Poses,
-    pixels_a: NDArray[np.float64],
-    T_map_b: Poses,
-    pixels_b: NDArray[np.float64],
-    camera: PinholeCamera,
+    T_map_a: Poses, pixels_a: F64, T_map_b: Poses, pixels_b: F64, camera: PinholeCamera
 ) -> Triangulated:
     """The points with the least reprojection errors in two views.
 
@@ -74,7 +69,7 @@ def triangulate_pairs(
     return Triangulated(*_triangulate(R_a, t_a, pixels_a, R_b, t_b, pixels_b, k))
 
 
-def _each(poses: Poses, n: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _each(poses: Poses, n: int) -> tuple[F64, F64]:
     rotations, positions = (poses.rotation, poses.translation) if isinstance(poses, SE3) else poses
     return (
         np.ascontiguousarray(np.broadcast_to(rotations, (n, 3, 3)), np.float64),
@@ -84,14 +79,8 @@ def _each(poses: Poses, n: int) -> tuple[NDArray[np.float64], NDArray[np.float64
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _triangulate(
-    R_a: NDArray,
-    t_a: NDArray,
-    pixels_a: NDArray,
-    R_b: NDArray,
-    t_b: NDArray,
-    pixels_b: NDArray,
-    k: NDArray,
-) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray, NDArray]:
+    R_a: F64, t_a: F64, pixels_a: F64, R_b: F64, t_b: F64, pixels_b: F64, k: F64
+) -> tuple[F64, F64, F64, F64, F64, Mask]:
     n = len(pixels_a)
     points, depth, sigma = np.full((n, 3), np.nan), np.full(n, np.nan), np.full(n, np.nan)
     parallax, error, good = np.full(n, np.nan), np.full(n, np.nan), np.zeros(n, np.bool_)
@@ -120,31 +109,31 @@ def _triangulate(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _linear_inverse_depth(
-    R: NDArray, t: NDArray, u: float, v: float, ub: float, vb: float
-) -> float:
+def _linear_inverse_depth(R: F64, t: F64, u: float, v: float, ub: float, vb: float) -> float:
     """rho of R (u, v, 1) + rho t parallel to (ub, vb, 1), least squares of two equations."""
     x = R[0, 0] * u + R[0, 1] * v + R[0, 2]
     y = R[1, 0] * u + R[1, 1] * v + R[1, 2]
     z = R[2, 0] * u + R[2, 1] * v + R[2, 2]
     cu, cv = t[0] - ub * t[2], t[1] - vb * t[2]
-    return (cu * (ub * z - x) + cv * (vb * z - y)) / (cu * cu + cv * cv)
+    result: float = (cu * (ub * z - x) + cv * (vb * z - y)) / (cu * cu + cv * cv)
+    return result
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _angle(R: NDArray, u: float, v: float, ub: float, vb: float) -> float:
+def _angle(R: F64, u: float, v: float, ub: float, vb: float) -> float:
     """Angle between the ray (u, v, 1) of view a and (ub, vb, 1) of view b [rad]."""
     x = R[0, 0] * u + R[0, 1] * v + R[0, 2]
     y = R[1, 0] * u + R[1, 1] * v + R[1, 2]
     z = R[2, 0] * u + R[2, 1] * v + R[2, 2]
     cx, cy, cz = y - z * vb, z * ub - x, x * vb - y * ub
-    return np.arctan2(np.sqrt(cx * cx + cy * cy + cz * cz), x * ub + y * vb + z)
+    result: float = np.arctan2(np.sqrt(cx * cx + cy * cy + cz * cz), x * ub + y * vb + z)
+    return result
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _gauss_newton(
-    R: NDArray, t: NDArray, x: NDArray, pixel_a: NDArray, pixel_b: NDArray, k: NDArray
-) -> tuple[NDArray, float, float]:
+    R: F64, t: F64, x: F64, pixel_a: F64, pixel_b: F64, k: F64
+) -> tuple[F64, float, float]:
     """Step of (u, v, rho), sigma of rho for 1 px, and the larger error [px] before the step."""
     hx = R[0, 0] * x[0] + R[0, 1] * x[1] + R[0, 2] + x[2] * t[0]
     hy = R[1, 0] * x[0] + R[1, 1] * x[1] + R[1, 2] + x[2] * t[1]

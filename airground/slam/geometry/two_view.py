@@ -8,12 +8,13 @@ images do not tell them apart none is given.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airground.core.arrays import read_only
+from airground.core.arrays import F64, Mask, read_only
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3, nearest_rotation, rotation_angle
 from airground.slam.geometry.epipolar import direction_by_two_rays, refine
@@ -50,8 +51,8 @@ class TwoViewStart:
     """
 
     T_a_b: SE3 | None
-    points_a: NDArray[np.float64]
-    inliers: NDArray[np.bool_]
+    points_a: F64
+    inliers: Mask
     parallax_rad: float
     good: bool
     reason: str
@@ -69,23 +70,24 @@ class _Answer:
 
     T_a_b: SE3
     points: Triangulated
-    inliers: NDArray[np.bool_]
+    inliers: Mask
     cost: float
     direction_sigma: float
 
     def same_as(self, other: _Answer) -> bool:
         turn = rotation_angle(self.T_a_b.rotation.T @ other.T_a_b.rotation)
         cosine = self.T_a_b.translation @ other.T_a_b.translation
-        return turn < SAME_ANSWER and cosine > np.cos(2 * SAME_ANSWER)
+        result: bool = turn < SAME_ANSWER and cosine > np.cos(2 * SAME_ANSWER)
+        return result
 
 
 def start_from_two_views(
-    pixels_a: NDArray[np.float64],
-    pixels_b: NDArray[np.float64],
+    pixels_a: F64,
+    pixels_b: F64,
     camera: PinholeCamera,
     rng: np.random.Generator,
     *,
-    R_a_b: NDArray[np.float64] | None = None,
+    R_a_b: F64 | None = None,
     rotation_sigma: float = 0.005,
     sigma_px: float = 0.5,
     min_parallax_deg: float = 1.5,
@@ -125,11 +127,7 @@ def start_from_two_views(
 
 
 def _answer(
-    R: NDArray,
-    t: NDArray,
-    rays_a: NDArray,
-    rays_b: NDArray,
-    sigmas: tuple[float, float, float],
+    R: F64, t: F64, rays_a: F64, rays_b: F64, sigmas: tuple[float, float, float]
 ) -> _Answer:
     """Refine one start, give the translation its sign, and triangulate."""
     wide, sigma, rotation_sigma = sigmas
@@ -150,17 +148,18 @@ def _answer(
     return _Answer(T_a_b, points, inliers, float(errors.sum()), direction_sigma)
 
 
-def _shifted_alike(rays_a: NDArray, rays_b: NDArray, R: NDArray) -> NDArray[np.bool_]:
+def _shifted_alike(rays_a: F64, rays_b: F64, R: F64) -> Mask:
     """(N,) whether a ray's shift, rotation removed, is not far above the median."""
     turned = np.column_stack([rays_b, np.ones(len(rays_b))]) @ R.T
     with np.errstate(divide="ignore", invalid="ignore"):
         shift = np.linalg.norm(turned[:, :2] / turned[:, 2:] - rays_a, axis=1)
-    return (turned[:, 2] > 0) & (shift <= MAX_SHIFT_RATIO * np.median(shift))
+    result: Mask = (turned[:, 2] > 0) & (shift <= MAX_SHIFT_RATIO * np.median(shift))
+    return result
 
 
 def _known_rotation(
-    rays_a: NDArray, rays_b: NDArray, R: NDArray, sigma: float, rng: np.random.Generator
-) -> list[tuple[NDArray, NDArray]]:
+    rays_a: F64, rays_b: F64, R: F64, sigma: float, rng: np.random.Generator
+) -> list[tuple[F64, F64]]:
     """The direction that most rays allow; none where no sample gives one."""
     near = _shifted_alike(rays_a, rays_b, R)
     n = int(near.sum())
@@ -172,12 +171,10 @@ def _known_rotation(
     return [(R, t)] if np.isfinite(t).all() else []
 
 
-def _unknown_rotation(
-    rays_a: NDArray, rays_b: NDArray, threshold: float
-) -> list[tuple[NDArray, NDArray]]:
+def _unknown_rotation(rays_a: F64, rays_b: F64, threshold: float) -> list[tuple[F64, F64]]:
     """Rotations and directions that an essential matrix or a homography allows."""
     # USAC starts its own generator anew in every call: the same input, the same answer.
-    starts: list[tuple[NDArray, NDArray]] = []
+    starts: list[tuple[NDArray[Any], NDArray[Any]]] = []
     E, _ = cv2.findEssentialMat(rays_b, rays_a, np.eye(3), cv2.USAC_ACCURATE, 0.9999, threshold)
     if E is not None and E.shape == (3, 3):
         R1, R2, t = cv2.decomposeEssentialMat(E)
@@ -187,7 +184,7 @@ def _unknown_rotation(
         _, rotations, translations, _ = cv2.decomposeHomographyMat(H, np.eye(3))
         starts += [(R, t.ravel()) for R, t in zip(rotations, translations, strict=True)]
     return [
-        (nearest_rotation(R), np.ascontiguousarray(t))
+        (nearest_rotation(R), np.ascontiguousarray(t, np.float64))
         for R, t in starts
         if np.linalg.norm(t) > 1e-9 and np.linalg.det(R) > 0
     ]

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
+from airground.core.arrays import F64
 from airground.core.se3 import SE3
 from airground.slam import so3
 from airground.slam.inertial.alignment_kernel import SHARED, STATE, Chain, normal_equations
@@ -74,29 +74,31 @@ class InertialAlignment:
     """
 
     scale: float
-    R_map_v: NDArray[np.float64]
-    velocities: NDArray[np.float64]
-    gyro_biases: NDArray[np.float64]
-    accelerometer_biases: NDArray[np.float64]
+    R_map_v: F64
+    velocities: F64
+    gyro_biases: F64
+    accelerometer_biases: F64
     scale_sigma: float
     tilt_sigma: float
     observable: bool
     rms: float
 
     @property
-    def gyro_bias(self) -> NDArray[np.float64]:
+    def gyro_bias(self) -> F64:
         """(3,) at the last keyframe [rad/s]."""
-        return self.gyro_biases[-1]
+        result: F64 = self.gyro_biases[-1]
+        return result
 
     @property
-    def accelerometer_bias(self) -> NDArray[np.float64]:
+    def accelerometer_bias(self) -> F64:
         """(3,) at the last keyframe [m/s^2]."""
-        return self.accelerometer_biases[-1]
+        result: F64 = self.accelerometer_biases[-1]
+        return result
 
 
 def align(
-    rotations: NDArray[np.float64],
-    centres: NDArray[np.float64],
+    rotations: F64,
+    centres: F64,
     T_rig_camera: SE3,
     motions: Sequence[Preintegration],
     noise: VisualNoise,
@@ -138,8 +140,8 @@ def align(
 
 
 def refine_scale(
-    rotations: NDArray[np.float64],
-    centres: NDArray[np.float64],
+    rotations: F64,
+    centres: F64,
     T_rig_camera: SE3,
     motions: Sequence[Preintegration | None],
     noise: VisualNoise,
@@ -188,17 +190,17 @@ class _State:
         gravity: (3,) in the axes of v.
     """
 
-    rotations: NDArray[np.float64]
-    vectors: NDArray[np.float64]
+    rotations: F64
+    vectors: F64
     log_scale: float
-    gravity: NDArray[np.float64]
+    gravity: F64
 
 
 @dataclass(frozen=True, eq=False)
 class _Solution:
     """What is known of the shared unknowns: (3, 3) covariance, and the residuals' rms."""
 
-    covariance: NDArray[np.float64]
+    covariance: F64
     rms: float
 
 
@@ -239,9 +241,7 @@ def _search(chain: Chain, state: _State) -> _Solution | None:
     return None
 
 
-def _result(
-    state: _State, R_map_v: NDArray[np.float64], solution: _Solution | None
-) -> InertialAlignment:
+def _result(state: _State, R_map_v: F64, solution: _Solution | None) -> InertialAlignment:
     """The state in the map's axes, with honest deviations."""
     scale, scale_sigma, tilt_sigma, rms = np.nan, np.inf, np.inf, np.nan
     if solution is not None:
@@ -265,8 +265,8 @@ def _result(
 
 
 def _chain(
-    rotations: NDArray[np.float64],
-    centres: NDArray[np.float64],
+    rotations: F64,
+    centres: F64,
     T_rig_camera: SE3,
     motions: Sequence[Preintegration | None],
     noise: VisualNoise,

@@ -7,12 +7,12 @@ logarithm of the scale and gravity's two tilts, a border of the band.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64, Mask
 from airground.slam.so3 import exp, hat, log, right_jacobian, right_jacobian_inverse
 
 STATE = 15
@@ -40,26 +40,24 @@ class Chain(NamedTuple):
             means are zero.
     """
 
-    rotations: NDArray[np.float64]
-    centres: NDArray[np.float64]
-    lever: NDArray[np.float64]
-    linked: NDArray[np.bool_]
-    durations: NDArray[np.float64]
-    turns: NDArray[np.float64]
-    velocities: NDArray[np.float64]
-    positions: NDArray[np.float64]
-    jacobians: NDArray[np.float64]
-    whitening: NDArray[np.float64]
-    gyro_biases: NDArray[np.float64]
-    accelerometer_biases: NDArray[np.float64]
-    walks: NDArray[np.float64]
-    sigmas: NDArray[np.float64]
+    rotations: F64
+    centres: F64
+    lever: F64
+    linked: Mask
+    durations: F64
+    turns: F64
+    velocities: F64
+    positions: F64
+    jacobians: F64
+    whitening: F64
+    gyro_biases: F64
+    accelerometer_biases: F64
+    walks: F64
+    sigmas: F64
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _scatter(
-    jacobian: NDArray, residual: NDArray, first: int, band: NDArray, border: NDArray, top: NDArray
-) -> None:
+def _scatter(jacobian: F64, residual: F64, first: int, band: F64, border: F64, top: F64) -> None:
     """Add J^T J and J^T r; the last columns of J are the shared ones.
 
     Args:
@@ -87,8 +85,8 @@ def _scatter(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _inertial(
-    chain: Chain, k: int, first: tuple, second: tuple, gravity: NDArray, tilts: NDArray
-) -> tuple[NDArray, NDArray]:
+    chain: Chain, k: int, first: tuple[Any, ...], second: tuple[Any, ...], gravity: F64, tilts: F64
+) -> tuple[F64, F64]:
     """(15,) white residual of motion and bias walk to the next keyframe, (15, 33) Jacobian."""
     R, p, v, gyro_bias, force_bias = first
     R2, p2, v2, gyro_bias2, force_bias2 = second
@@ -137,7 +135,7 @@ def _inertial(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _visual(chain: Chain, k: int, R: NDArray, p: NDArray, unit: float) -> tuple[NDArray, NDArray]:
+def _visual(chain: Chain, k: int, R: F64, p: F64, unit: float) -> tuple[F64, F64]:
     """(6,) white residual of a visual pose, (6, 18) Jacobian; `unit` is 1 / scale."""
     turn = log(chain.rotations[k].T @ R)
     centre = unit * (p + R @ chain.lever)
@@ -153,7 +151,7 @@ def _visual(chain: Chain, k: int, R: NDArray, p: NDArray, unit: float) -> tuple[
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _prior(chain: Chain, v: NDArray, gyro: NDArray, force: NDArray) -> tuple[NDArray, NDArray]:
+def _prior(chain: Chain, v: F64, gyro: F64, force: F64) -> tuple[F64, F64]:
     """(9,) white residual of velocity and biases where a chain begins, (9, 18) Jacobian."""
     residual = np.empty(9)
     jacobian = np.zeros((9, STATE + SHARED))
@@ -167,13 +165,8 @@ def _prior(chain: Chain, v: NDArray, gyro: NDArray, force: NDArray) -> tuple[NDA
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def normal_equations(
-    chain: Chain,
-    rotations: NDArray[np.float64],
-    vectors: NDArray[np.float64],
-    unit: float,
-    gravity: NDArray[np.float64],
-    tilts: NDArray[np.float64],
-) -> tuple[NDArray, NDArray, NDArray, float]:
+    chain: Chain, rotations: F64, vectors: F64, unit: float, gravity: F64, tilts: F64
+) -> tuple[F64, F64, F64, float]:
     """The band, its border with the gradient, the shared corner, and the sum of squares.
 
     Args:
@@ -195,11 +188,11 @@ def normal_equations(
         p, v, gyro, force = vectors[k, 0], vectors[k, 1], vectors[k, 2], vectors[k, 3]
         residual, jacobian = _visual(chain, k, rotations[k], p, unit)
         _scatter(jacobian, residual, STATE * k, band, border, top)
-        cost += residual @ residual
+        cost += float(residual @ residual)
         if k == 0 or not chain.linked[k - 1]:
             residual, jacobian = _prior(chain, v, gyro, force)
             _scatter(jacobian, residual, STATE * k, band, border, top)
-            cost += residual @ residual
+            cost += float(residual @ residual)
         if k + 1 < count and chain.linked[k]:
             following = vectors[k + 1]
             residual, jacobian = _inertial(
@@ -211,5 +204,5 @@ def normal_equations(
                 tilts,
             )
             _scatter(jacobian, residual, STATE * k, band, border, top)
-            cost += residual @ residual
+            cost += float(residual @ residual)
     return band, border, top, cost

@@ -12,8 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64, I64
 from airground.slam import so3
 from airground.slam.inertial.alignment_kernel import Chain
 from airground.slam.inertial.preintegration import GRAVITY
@@ -38,18 +38,18 @@ class Start:
 
     unit: float
     unit_sigma: float
-    gravity: NDArray[np.float64]
-    velocities: NDArray[np.float64]
-    gyro_bias: NDArray[np.float64]
-    accelerometer_bias: NDArray[np.float64]
+    gravity: F64
+    velocities: F64
+    gyro_bias: F64
+    accelerometer_bias: F64
 
 
-def tangent_basis(direction: NDArray[np.float64]) -> NDArray[np.float64]:
+def tangent_basis(direction: F64) -> F64:
     """(3, 2) orthonormal vectors across `direction`."""
     return np.linalg.svd(direction[None])[2][1:].T
 
 
-def gyro_bias_from_rotations(chain: Chain) -> NDArray[np.float64]:
+def gyro_bias_from_rotations(chain: Chain) -> F64:
     """(3,) bias with which the gyro turns as the camera did, to first order."""
     matrix, gradient = np.zeros((3, 3)), np.zeros(3)
     for k, turn in enumerate(chain.turns):
@@ -59,7 +59,8 @@ def gyro_bias_from_rotations(chain: Chain) -> NDArray[np.float64]:
         gradient += jacobian.T @ error
     prior = (chain.sigmas[0] / chain.sigmas[3]) ** 2 * np.eye(3)
     bias = chain.gyro_biases[0]
-    return bias + np.linalg.solve(matrix + prior, gradient - prior @ bias)
+    result: F64 = bias + np.linalg.solve(matrix + prior, gradient - prior @ bias)
+    return result
 
 
 def closed_form(chain: Chain) -> Start:
@@ -104,7 +105,7 @@ def closed_form(chain: Chain) -> Start:
     return Start(unit, sigma, gravity, velocities, gyro_bias, chain.accelerometer_biases[0] + bias)
 
 
-def _pieces(durations: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+def _pieces(durations: F64) -> tuple[I64, F64]:
     """(K,) number of the piece that each keyframe lies in, (K,) time since the piece began."""
     times = np.concatenate([[0.0], np.cumsum(durations)])
     count = max(1, round(times[-1] / PIECE_S))
@@ -113,9 +114,7 @@ def _pieces(durations: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[
     return pieces, times - times[np.searchsorted(pieces, pieces)]
 
 
-def _inertial_path(
-    chain: Chain, gyro_bias: NDArray[np.float64], pieces: NDArray[np.int64]
-) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+def _inertial_path(chain: Chain, gyro_bias: F64, pieces: I64) -> tuple[F64, F64, F64, F64]:
     """(K, 3) velocity and position without gravity since each piece began at rest in the
     origin, (K, 3, 3) each by the bias."""
     count = len(chain.rotations)

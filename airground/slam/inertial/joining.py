@@ -8,8 +8,8 @@ visual-inertial odometry", T-RO 2017, Appendix A and B.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64
 from airground.slam import so3
 from airground.slam.inertial.preintegration import Preintegration
 
@@ -50,7 +50,7 @@ def join(first: Preintegration, second: Preintegration) -> Preintegration:
     )
 
 
-def _by_biases(motion: Preintegration) -> NDArray[np.float64]:
+def _by_biases(motion: Preintegration) -> F64:
     """(9, 6) rotation, velocity and position by the biases of gyro and accelerometer."""
     return np.block(
         [
@@ -61,7 +61,7 @@ def _by_biases(motion: Preintegration) -> NDArray[np.float64]:
     )
 
 
-def _frozen(array: NDArray[np.float64]) -> NDArray[np.float64]:
+def _frozen(array: F64) -> F64:
     array = np.ascontiguousarray(array)
     array.flags.writeable = False
     return array

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64
 from airground.core.messages import ImuNoise, ImuSamples
 from airground.errors import InputError
 from airground.slam import so3
@@ -29,8 +29,8 @@ the clocks' difference after the newest of them [s]."""
 
 FIRST_CAPACITY = 4096
 
-Rotation = NDArray[np.float64]
-Vector = NDArray[np.float64]
+Rotation = F64
+Vector = F64
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,17 +56,17 @@ class Preintegration:
     """
 
     duration_s: float
-    rotation: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    position: NDArray[np.float64]
-    rotation_by_gyro_bias: NDArray[np.float64]
-    velocity_by_gyro_bias: NDArray[np.float64]
-    velocity_by_accelerometer_bias: NDArray[np.float64]
-    position_by_gyro_bias: NDArray[np.float64]
-    position_by_accelerometer_bias: NDArray[np.float64]
-    covariance: NDArray[np.float64]
-    gyro_bias: NDArray[np.float64]
-    accelerometer_bias: NDArray[np.float64]
+    rotation: F64
+    velocity: F64
+    position: F64
+    rotation_by_gyro_bias: F64
+    velocity_by_gyro_bias: F64
+    velocity_by_accelerometer_bias: F64
+    position_by_gyro_bias: F64
+    position_by_accelerometer_bias: F64
+    covariance: F64
+    gyro_bias: F64
+    accelerometer_bias: F64
     gyro_bias_sigma: float
     accelerometer_bias_sigma: float
     longest_gap_s: float

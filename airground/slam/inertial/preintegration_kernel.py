@@ -9,29 +9,29 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64, I64
 from airground.slam.so3 import exp, right_jacobian
 
-Sums = tuple[NDArray, NDArray, NDArray, NDArray, NDArray, float]
+Sums = tuple[F64, F64, F64, F64, F64, float]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _interpolated(
-    stamps: NDArray[np.int64], readings: NDArray, stamp: int, after: int
-) -> NDArray[np.float64]:
+def _interpolated(stamps: I64, readings: F64, stamp: int, after: int) -> F64:
     """(6,) reading at `stamp`, which lies before sample `after`; the nearest one at the ends."""
     if after == 0:
-        return readings[0].copy()
-    if after == len(stamps):
-        return readings[after - 1].copy()
-    before = after - 1
-    share = (stamp - stamps[before]) / (stamps[after] - stamps[before])
-    return (1.0 - share) * readings[before] + share * readings[after]
+        reading: F64 = readings[0].copy()
+    elif after == len(stamps):
+        reading = readings[after - 1].copy()
+    else:
+        before = after - 1
+        share = (stamp - stamps[before]) / (stamps[after] - stamps[before])
+        reading = (1.0 - share) * readings[before] + share * readings[after]
+    return reading
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _product(a: NDArray, b: NDArray, out: NDArray) -> None:
+def _product(a: F64, b: F64, out: F64) -> None:
     """out = a @ b for (3, 3) and (3, n); BLAS takes longer to call than this to run."""
     for i in range(3):
         for j in range(b.shape[1]):
@@ -39,7 +39,7 @@ def _product(a: NDArray, b: NDArray, out: NDArray) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _turned_force(rotation: NDArray, force: NDArray, out: NDArray) -> None:
+def _turned_force(rotation: F64, force: F64, out: F64) -> None:
     """out = rotation @ hat(force): how the turned force changes with the rotation, negated."""
     x, y, z = force[0], force[1], force[2]
     for i in range(3):
@@ -49,9 +49,7 @@ def _turned_force(rotation: NDArray, force: NDArray, out: NDArray) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _propagate(
-    covariance: NDArray, turn: NDArray, lever: NDArray, dt: float, rows: NDArray, lean: NDArray
-) -> None:
+def _propagate(covariance: F64, turn: F64, lever: F64, dt: float, rows: F64, lean: F64) -> None:
     """covariance <- F covariance F^T for the 9 x 9 transition F of one step.
 
     F = [turn^T 0 0; dt lever, 1, 0; dt^2/2 lever, dt, 1]. It is applied to the rows twice,
@@ -74,7 +72,7 @@ def _propagate(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _add_noise(
-    covariance: NDArray, jacobian: NDArray, tilt: NDArray, dt: float, gyro: float, force: float
+    covariance: F64, jacobian: F64, tilt: F64, dt: float, gyro: float, force: float
 ) -> None:
     """Add the white noise of one step; `gyro` and `force` are squared densities.
 
@@ -103,16 +101,16 @@ def _add_noise(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _mean_force(
-    rotation: NDArray,
-    turned: NDArray,
-    turn: NDArray,
-    sweep: NDArray,
-    reading: NDArray,
-    following: NDArray,
-    force: NDArray,
-    lever: NDArray,
-    tilt: NDArray,
-    work: NDArray,
+    rotation: F64,
+    turned: F64,
+    turn: F64,
+    sweep: F64,
+    reading: F64,
+    following: F64,
+    force: F64,
+    lever: F64,
+    tilt: F64,
+    work: F64,
 ) -> None:
     """The mean force of a step in the start's frame, and how it changes.
 
@@ -140,17 +138,17 @@ def _mean_force(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _add_step(
-    velocity: NDArray,
-    position: NDArray,
-    jacobians: NDArray,
+    velocity: F64,
+    position: F64,
+    jacobians: F64,
     dt: float,
-    force: NDArray,
-    leant: NDArray,
-    turned_back: NDArray,
-    tilt: NDArray,
-    jacobian: NDArray,
-    rotation: NDArray,
-    turned: NDArray,
+    force: F64,
+    leant: F64,
+    turned_back: F64,
+    tilt: F64,
+    jacobian: F64,
+    rotation: F64,
+    turned: F64,
 ) -> None:
     """Add one step to velocity, position and their Jacobians.
 
@@ -178,12 +176,12 @@ def _add_step(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def preintegrate(
-    stamps: NDArray[np.int64],
-    readings: NDArray[np.float64],
+    stamps: I64,
+    readings: F64,
     start: int,
     end: int,
-    gyro_bias: NDArray[np.float64],
-    accelerometer_bias: NDArray[np.float64],
+    gyro_bias: F64,
+    accelerometer_bias: F64,
     gyro_density: float,
     accelerometer_density: float,
 ) -> Sums:
@@ -251,11 +249,12 @@ def preintegrate(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _gap(stamps: NDArray[np.int64], start: int, end: int) -> float:
+def _gap(stamps: I64, start: int, end: int) -> float:
     """The longest time between neighbouring samples that any of [start, end] lies in [s]."""
     first = max(int(np.searchsorted(stamps, start, side="right")) - 1, 0)
     last = min(int(np.searchsorted(stamps, end, side="left")), len(stamps) - 1)
     longest = max(stamps[0] - start, end - stamps[-1], 0)
     for index in range(first, last):
         longest = max(longest, stamps[index + 1] - stamps[index])
-    return longest * 1e-9
+    result: float = longest * 1e-9
+    return result

@@ -11,8 +11,8 @@ it: in these the motion is linear, so that no first guess of the scale is needed
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64
 from airground.core.se3 import SE3
 from airground.slam import so3
 from airground.slam.inertial.alignment import (
@@ -62,8 +62,8 @@ class ScaleFilter:
         sigmas[BIAS], sigmas[TILTS] = ACCELEROMETER_BIAS_SIGMA, TILT_SIGMA
         sigmas[UNIT] = UNIT_SIGMA
         self._covariance = np.diag((sigmas / guess) ** 2)
-        self._gravity: NDArray[np.float64] | None = None
-        self._rotation: NDArray[np.float64] | None = None
+        self._gravity: F64 | None = None
+        self._rotation: F64 | None = None
         self._images = 0
         self._anchored = False
         self._surprise = 1.0
@@ -87,26 +87,21 @@ class ScaleFilter:
         return self.sigma < OBSERVABLE_SIGMA
 
     @property
-    def gravity(self) -> NDArray[np.float64] | None:
+    def gravity(self) -> F64 | None:
         """(3,) in the visual map's axes [m/s^2]; None before the first inertial motion."""
         return self._gravity
 
     @property
-    def velocity(self) -> NDArray[np.float64]:
+    def velocity(self) -> F64:
         """(3,) of the rig in the visual map's axes [m/s]; NaN while the scale is."""
         return self._mean[VELOCITY] * self.scale
 
     @property
-    def accelerometer_bias(self) -> NDArray[np.float64]:
+    def accelerometer_bias(self) -> F64:
         """(3,) [m/s^2]; NaN while the scale is."""
         return self._mean[BIAS] * self.scale
 
-    def add(
-        self,
-        rotation: NDArray[np.float64],
-        centre: NDArray[np.float64],
-        motion: Preintegration | None,
-    ) -> None:
+    def add(self, rotation: F64, centre: F64, motion: Preintegration | None) -> None:
         """Take in one image.
 
         Args:
@@ -129,14 +124,14 @@ class ScaleFilter:
             self._anchor_bias()
         self._turn_gravity()
 
-    def _forget_motion(self, centre: NDArray[np.float64]) -> None:
+    def _forget_motion(self, centre: F64) -> None:
         """The robot may be anywhere, at any speed."""
         unit = abs(self._mean[UNIT])
         self._covariance[:6], self._covariance[:, :6] = 0.0, 0.0
         self._covariance[range(6), range(6)] = (SPEED_SIGMA * unit) ** 2
         self._mean[POSITION], self._mean[VELOCITY] = centre, 0.0
 
-    def _predict(self, R: NDArray[np.float64], motion: Preintegration) -> None:
+    def _predict(self, R: F64, motion: Preintegration) -> None:
         """Move on by one inertial motion that began at rotation R."""
         t = motion.duration_s
         by_bias = motion.velocity_by_accelerometer_bias, motion.position_by_accelerometer_bias
@@ -168,7 +163,7 @@ class ScaleFilter:
         square = self._mean[UNIT] ** 2 + self._covariance[UNIT, UNIT]
         self._covariance = F @ self._covariance @ F.T + square * noise
 
-    def _update(self, rotation: NDArray[np.float64], centre: NDArray[np.float64]) -> None:
+    def _update(self, rotation: F64, centre: F64) -> None:
         """Take in where the camera is."""
         H = np.zeros((3, SIZE))
         H[:, POSITION] = np.eye(3)
@@ -183,7 +178,7 @@ class ScaleFilter:
         self._measure(H, np.zeros(3), ACCELEROMETER_BIAS_SIGMA * self._mean[UNIT])
         self._anchored = True
 
-    def _measure(self, H: NDArray[np.float64], value: NDArray[np.float64], sigma: float) -> float:
+    def _measure(self, H: F64, value: F64, sigma: float) -> float:
         """Take in three numbers; returns their normalized innovation squared, by three."""
         white = sigma**2 * np.eye(3)
         innovation = value - H @ self._mean

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from airground.core.arrays import F64
 from airground.core.messages import ImuNoise, ImuSamples
 from airground.slam.inertial.preintegration import GRAVITY
 
@@ -32,11 +32,11 @@ class Rest:
         specific_force: (3,) mean: up, in the rig, and the accelerometer's bias [m/s^2].
     """
 
-    gyro: NDArray[np.float64]
-    specific_force: NDArray[np.float64]
+    gyro: F64
+    specific_force: F64
 
     @property
-    def accelerometer_bias(self) -> NDArray[np.float64]:
+    def accelerometer_bias(self) -> F64:
         """(3,) what makes it stronger or weaker than gravity; across gravity nobody knows."""
         strength = float(np.linalg.norm(self.specific_force))
         return self.specific_force * (1.0 - GRAVITY / strength)
@@ -70,9 +70,7 @@ def at_rest(samples: ImuSamples, noise: ImuNoise) -> Rest | None:
     return Rest(gyro, force) if still else None
 
 
-def gravity_aligned(
-    mean_specific_force: NDArray[np.float64], forward_hint: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def gravity_aligned(mean_specific_force: F64, forward_hint: F64) -> F64:
     """(3, 3) `R_map_imu` of a map whose z axis points up and whose heading is the hint's.
 
     Args:
