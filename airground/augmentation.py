@@ -15,10 +15,10 @@ from airground.core.voxel_map import VoxelMap
 
 @dataclass(frozen=True, eq=False)
 class AugmentedMap:
-    """One cloud in the frame `ground` in which each point knows who saw it.
+    """One cloud in the frame `ground` with the robot that saw each point.
 
     Attributes:
-        cloud_ground: All points.
+        cloud_ground: Cloud of all points in the frame `ground`.
         sources: (N,) uint8, a `Source` each.
     """
 

@@ -1,4 +1,4 @@
-"""The one family of errors that a user is meant to read."""
+"""The errors that are meant for users."""
 
 
 class AirgroundError(Exception):
@@ -10,7 +10,7 @@ class AirgroundError(Exception):
 
 
 class InputError(AirgroundError):
-    """What the user handed over (a file, a key, a number) cannot be used."""
+    """An input (a file, a key, a number) cannot be used."""
 
 
 class RecordingError(InputError):

@@ -1,7 +1,7 @@
-"""The lower half of Figure 4: each robot tracks on its own, and tells the mapper frame by frame.
+"""The lower half of Figure 4: each robot tracks on its own and sends frames to the mapper.
 
-A tracker never asks the mapper anything. What it hands over stays as it is, so that mapping
-gives the same result whenever it gets to it, in this process or in another one.
+A tracker never depends on the mapper, and its frames never change afterwards: mapping gives the
+same result in this process or in another one, at any speed.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from airground.slam.front_end import FrontEnd, TrackedPose
 
 @dataclass(frozen=True)
 class FrontEnds:
-    """Who says where the cameras are (Sec. IV)."""
+    """The front ends of both robots (Sec. IV)."""
 
     mav: FrontEnd[MavImage]
     ground: FrontEnd[GroundImage]
@@ -35,14 +35,14 @@ class FrontEnds:
 
 @dataclass(frozen=True, eq=False)
 class TrackedFrame:
-    """One image, and all that the mapper is told with it.
+    """One image, and what the mapper receives with it.
 
     Attributes:
-        image: As the camera took it.
-        pose: Where the camera was, if that is known.
-        north_rad: Direction of magnetic north in the robot's map by now; None while unknown.
-        trajectory: Every image tracked so far where it is believed to be now, of the ground
-            robot and where its map was corrected with this image; else None.
+        image: Image of the camera.
+        pose: Answer of the front end to this image.
+        north_rad: Direction of magnetic north in the robot's map [rad]; None while unknown.
+        trajectory: Newest poses of all images so far, of the ground robot and only where this
+            image corrected its map; else None.
     """
 
     image: MavImage | GroundImage
@@ -52,22 +52,22 @@ class TrackedFrame:
 
     @property
     def robot(self) -> Source:
-        """Whose it is."""
+        """The robot that took the image."""
         return Source.MAV if isinstance(self.image, MavImage) else Source.GROUND
 
     @property
     def stamp_ns(self) -> int:
-        """When the image was taken."""
+        """Stamp of the image [ns]."""
         return self.image.stamp_ns
 
 
 class RobotTracker:
-    """Poses of one robot, and where magnetic north lies in its map.
+    """Poses of one robot, and the direction of magnetic north in its map.
 
     Args:
-        robot: Which one.
-        calibration: What is known about its sensors.
-        front_end: Who says where its camera is.
+        robot: The robot.
+        calibration: Nominal calibration of its sensors.
+        front_end: Front end that tracks its camera.
     """
 
     def __init__(
@@ -90,19 +90,19 @@ class RobotTracker:
         return None
 
     def finish(self) -> Trajectory | None:
-        """There are no more images: every image where it is believed to be at last."""
+        """Finish after the last image; returns the final poses of all images."""
         self._front_end.finish()
         return self._front_end.trajectory()
 
     def _track(self, image: MavImage | GroundImage) -> TrackedFrame:
         pose = self._front_end.track(image)
         trajectory = None
-        # What was measured before the robot knew its attitude says nothing.
+        # Samples from before the first attitude are of no use.
         magnetic, self._magnetic = self._magnetic, []
         if pose.T_map_camera is not None:
             for samples in magnetic:
                 self._north.add(samples.field, pose.T_map_camera @ self._T_camera_imu)
-            # Surfaces that the MAV has handed over stay as they were: nobody needs its path.
+            # The MAV's surfaces do not follow corrections, so that its path is not needed.
             if pose.corrected and self._robot == Source.GROUND:
                 trajectory = self._front_end.trajectory()
         return TrackedFrame(image, pose, self._north.heading(), trajectory)
@@ -112,8 +112,8 @@ class Trackers:
     """Both robots' trackers, fed from one stream of messages.
 
     Args:
-        mav, ground: What is known about the robots' sensors.
-        front_ends: Who says where the cameras are.
+        mav, ground: Nominal calibration of each robot.
+        front_ends: Front ends of both robots.
     """
 
     def __init__(
@@ -132,15 +132,15 @@ class Trackers:
                 yield frame
 
     def finish(self) -> Trajectory | None:
-        """There are no more messages; returns the ground robot's path as believed at last."""
+        """Finish after the last message; returns the final path of the ground robot."""
         self._trackers[Source.MAV].finish()
         return self._trackers[Source.GROUND].finish()
 
 
 class HandOver:
-    """Frames of one robot on their way to the mapper, of which some may not arrive.
+    """Frames of one robot on their way to the mapper, some of which are dropped.
 
-    One that does not leaves its correction of the map to the next that does.
+    The correction of the map in a dropped frame goes into the next frame that arrives.
     """
 
     def __init__(self) -> None:
@@ -152,7 +152,7 @@ class HandOver:
             self._correction = frame.trajectory
 
     def pass_on(self, frame: TrackedFrame) -> TrackedFrame:
-        """What reaches the mapper with this frame."""
+        """The frame as the mapper receives it."""
         if frame.trajectory is None and self._correction is not None:
             frame = replace(frame, trajectory=self._correction)
         self._correction = None

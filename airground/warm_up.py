@@ -1,4 +1,4 @@
-"""Compiles what all stages need before the first frame is waiting for it."""
+"""Compiles the kernels of all stages before the first frame arrives."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ def warm_up(config: Config, rng: np.random.Generator) -> None:
     """Compile tracking and mapping.
 
     Args:
-        config: What will run.
-        rng: Draws what it is tried on.
+        config: Configuration that will run.
+        rng: Source of the data to compile with.
     """
     warm_up_slam(rng)
     warm_up_mapping(config, rng)

@@ -1,6 +1,6 @@
-"""Whether two height maps agree by more than chance, wherever they were laid.
+"""Whether two overlaid height maps agree by more than chance.
 
-Two heaps on a floor agree over half of their area whatever one does, since floor lies on
+Two heaps on a floor agree over half of their area at any place, since floor lies on
 floor; so the share of agreeing cells says little. What counts is how far it exceeds the
 share that the same maps reach in wrong places: Cohen's kappa, with chance measured by
 shifting. On flat ground, on a slope, along a ridge and in a regular pattern a shift does
@@ -28,8 +28,8 @@ class Agreement:
     """How well two overlaid height maps agree.
 
     Attributes:
-        cells: Cells filled in both.
-        share: Of these, the share whose heights differ by at most 5 cm from the median
+        cells: Number of cells filled in both maps.
+        share: Share of these cells whose heights differ by at most 5 cm from the median
             difference; 0 where too few overlap.
         chance: Highest share at 16 places shifted by 0.4 m.
     """

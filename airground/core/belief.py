@@ -46,7 +46,7 @@ class CostMap:
         cells_per_m: Resolution.
         heading: Turn of the frame `mav` in `ground` that it was computed for [rad]; where
             headings were searched, that of the lowest cost.
-        cost: Which cost: "zmssd" [m^2] or "ncc" [1 - correlation].
+        cost: Kind of cost: "zmssd" [m^2] or "ncc" [1 - correlation].
     """
 
     costs: F32
@@ -72,15 +72,15 @@ class Belief:
     """Where the MAV's reference camera is in the frame `ground`, as particles (Eq. 4).
 
     Attributes:
-        stamp_ns: Of the aerial surface that this belief has taken in.
+        stamp_ns: Stamp of the newest aerial surface in this belief [ns].
         particles: (M, 3) float64: x, y [m] and heading [rad] of `mav` in `ground`.
         estimate: (3,) float64: the reported x, y, heading.
-        covariance: (2, 2) float64 of x and y [m^2].
+        covariance: (2, 2) float64 covariance of x and y [m^2].
         cost: Cost at the estimate, NaN where the overlap is too small.
-        height_offset: Delta z of Sec. VI-A [m]: what to add to heights in `mav`.
+        height_offset: Delta z of Sec. VI-A [m], to be added to heights in `mav`.
         T_ground_mav: The estimate as a motion between the robots' maps.
         converged: Whether a position is claimed.
-        refusal: Why none is claimed; empty when converged.
+        refusal: Reason why no position is claimed; empty when converged.
     """
 
     stamp_ns: int
@@ -109,12 +109,12 @@ class Alignment:
     """The MAV's map aligned with the ground robot's (Sec. VII).
 
     Attributes:
-        stamp_ns: Of the aerial surface that was aligned.
+        stamp_ns: Stamp of the aligned aerial surface [ns].
         T_ground_mav: The refined motion between the robots' maps.
-        inliers: Share of the aerial points that lie on the ground map, of those over it.
+        inliers: Share of the aerial points over the ground map that lie on it.
         rmse_m: Root mean square distance of the inliers to the ground map's planes [m].
         accepted: Whether the alignment may be used.
-        refusal: Why not; empty when accepted.
+        refusal: Reason of the refusal; empty when accepted.
     """
 
     stamp_ns: int

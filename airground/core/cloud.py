@@ -1,4 +1,4 @@
-"""A point cloud, and who saw each point."""
+"""A point cloud, and the robot that saw each point."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class PointCloud:
     Attributes:
         points: (N, 3) float32 [m], all finite.
         colours: (N, 3) uint8 RGB; grey points repeat their value.
-        normals: (N, 3) float32 unit vectors, or None where nobody computed them.
+        normals: (N, 3) float32 unit vectors, or None where not computed.
     """
 
     points: F32

@@ -28,8 +28,8 @@ class MavTracked(Event):
     """The MAV's camera has a pose (Sec. IV).
 
     Attributes:
-        T_mav_camera: Where it is.
-        covariance: (6, 6) of the pose's error in the map's axes: position [m], then
+        T_mav_camera: Pose of the camera in the MAV's map.
+        covariance: (6, 6) covariance of the pose's error in the map's axes: position [m], then
             rotation vector [rad]; None where the front end has none.
         scale_sigma: Standard deviation of the map's scale, as a share of it; None where it
             is not estimated.
@@ -45,9 +45,9 @@ class GroundTracked(Event):
     """The ground robot's camera has a pose (Sec. IV).
 
     Attributes:
-        T_ground_camera: Where it is.
-        covariance: As in `MavTracked`.
-        scale_sigma: As in `MavTracked`.
+        T_ground_camera: Pose of the camera in the ground robot's map.
+        covariance: (6, 6) covariance as in `MavTracked`.
+        scale_sigma: Relative standard deviation of the scale, as in `MavTracked`.
     """
 
     T_ground_camera: SE3
@@ -102,7 +102,7 @@ class FieldAdded(Event):
     """A depth map went into the histogram of distance fields (Sec. V).
 
     Attributes:
-        reference_stamp_ns: Which depth map: that of this reference view.
+        reference_stamp_ns: Stamp of the depth map's reference view [ns].
     """
 
     reference_stamp_ns: int

@@ -1,4 +1,4 @@
-"""What the sensors say: one frozen type a message, each stamped in integer nanoseconds."""
+"""Sensor messages: one frozen type per message, stamped in integer nanoseconds."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class MavImage:
     """One image of the MAV's downward camera.
 
     Attributes:
-        stamp_ns: When the middle of the exposure was, by the camera's clock.
+        stamp_ns: Middle of the exposure on the camera's clock [ns].
         image: (height, width) uint8, grey.
     """
 
@@ -33,7 +33,7 @@ class GroundImage:
     """One registered RGB-D frame of the ground robot.
 
     Attributes:
-        stamp_ns: When the middle of the exposure was, by the camera's clock.
+        stamp_ns: Middle of the exposure on the camera's clock [ns].
         colour: (height, width, 3) uint8 RGB.
         depth: (height, width) float32 [m], z along the optical axis, NaN where missing.
     """
@@ -55,8 +55,8 @@ class ImuSamples:
 
     Attributes:
         stamps_ns: (N,) int64, strictly increasing.
-        gyro: (N, 3) float64 [rad/s].
-        accelerometer: (N, 3) float64 [m/s^2]; at rest it reads +9.81 upwards.
+        gyro: (N, 3) float64 angular rates [rad/s].
+        accelerometer: (N, 3) float64 specific forces [m/s^2], +9.81 upwards at rest.
     """
 
     stamps_ns: I64
@@ -88,7 +88,7 @@ class MagneticSamples:
 
     Attributes:
         stamps_ns: (N,) int64, strictly increasing.
-        field: (N, 3) float64 [T].
+        field: (N, 3) float64 magnetic field [T].
     """
 
     stamps_ns: I64
@@ -111,13 +111,13 @@ class MagneticSamples:
 
 @dataclass(frozen=True)
 class ImuNoise:
-    """How much an inertial sensor errs, as its data sheet says.
+    """Noise of an inertial sensor by its data sheet.
 
     Attributes:
-        gyro_noise_density: [rad/s/sqrt(Hz)]
-        gyro_bias_walk: [rad/s^2/sqrt(Hz)]
-        accelerometer_noise_density: [m/s^2/sqrt(Hz)]
-        accelerometer_bias_walk: [m/s^3/sqrt(Hz)]
+        gyro_noise_density: Noise density of the gyro [rad/s/sqrt(Hz)].
+        gyro_bias_walk: Random walk of the gyro's bias [rad/s^2/sqrt(Hz)].
+        accelerometer_noise_density: Noise density of the accelerometer [m/s^2/sqrt(Hz)].
+        accelerometer_bias_walk: Random walk of the accelerometer's bias [m/s^3/sqrt(Hz)].
     """
 
     gyro_noise_density: float
@@ -128,12 +128,12 @@ class ImuNoise:
 
 @dataclass(frozen=True)
 class RobotCalibration:
-    """What the pipeline is told about one robot's sensors (slightly wrong, as in life).
+    """Nominal calibration of one robot's sensors, with the errors of a real calibration.
 
     Attributes:
-        camera: Intrinsics of its camera.
-        T_imu_camera: The camera in the IMU's frame.
-        T_body_imu: The IMU in the robot's body (x forward, z up).
+        camera: Intrinsics of the camera.
+        T_imu_camera: Pose of the camera in the IMU's frame.
+        T_body_imu: Pose of the IMU in the robot's body (x forward, z up).
         imu: Noise of the inertial sensor; None where the robot has none, or no gyro.
         camera_time_offset_ns: What to add to a stamp of the camera to get the time on the
             IMU's clock [ns].

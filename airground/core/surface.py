@@ -1,4 +1,4 @@
-"""What the MAV saw, in two steps: one depth map, and the surface fused from several."""
+"""What the MAV reconstructs: a depth map, and the surface fused from several."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ class DepthMap:
     """Depth of one reference view, from many close views (Sec. V).
 
     Attributes:
-        stamp_ns: Of the reference view.
-        camera: The (half resolution) camera of the map.
-        T_mav_camera: The reference view in the MAV's map.
+        stamp_ns: Stamp of the reference view [ns].
+        camera: Camera of the depth map (half resolution).
+        T_mav_camera: Pose of the reference view in the MAV's map.
         depth: (height, width) float32 [m] along the optical axis, NaN where rejected.
         image: (height, width) uint8, the reference view at the same resolution.
-        views: How many views were compared with the reference.
+        views: Number of views compared with the reference.
     """
 
     stamp_ns: int
@@ -43,13 +43,13 @@ class AerialSurface:
     """A surface fused from several depth maps and seen from a reference view (Sec. V).
 
     Attributes:
-        stamp_ns: Of the newest frame that went in: when the surface became known.
-        reference_stamp_ns: Of the reference view.
-        camera: The camera that `depth` was ray-cast for.
-        T_mav_camera: The reference view in the MAV's map.
+        stamp_ns: Stamp of the newest frame in the surface [ns].
+        reference_stamp_ns: Stamp of the reference view [ns].
+        camera: Camera of `depth`.
+        T_mav_camera: Pose of the reference view in the MAV's map.
         depth: (height, width) float32 [m], NaN where nothing was fused.
-        cloud_mav: The same points in the MAV's map (grey colours, with normals).
-        depth_maps: How many depth maps went in.
+        cloud_mav: Points of the surface in the MAV's map (grey colours, with normals).
+        depth_maps: Number of fused depth maps.
     """
 
     stamp_ns: int

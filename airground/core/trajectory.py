@@ -17,8 +17,8 @@ class Trajectory:
 
     Attributes:
         stamps_ns: (N,) int64, strictly increasing, N >= 1.
-        rotations: (N, 3, 3) float64.
-        translations: (N, 3) float64 [m].
+        rotations: (N, 3, 3) float64 rotations of the poses.
+        translations: (N, 3) float64 positions [m].
     """
 
     stamps_ns: I64

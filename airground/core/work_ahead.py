@@ -1,4 +1,4 @@
-"""Working a little ahead: the next items are made while the newest one is worked on."""
+"""Producing items ahead of use, in another thread."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from itertools import islice, repeat
 from typing import TypeVar
 
 AHEAD = 4
-"""Reads that may be done or under way before they are asked for."""
+"""Reads ahead of use: enough to hide the jitter of decoding, few enough to hold in memory."""
 
 Item = TypeVar("Item")
 Argument = TypeVar("Argument")
@@ -25,10 +25,10 @@ def read_ahead(
     """What `read` gives for each argument, in order; it raises where `read` does.
 
     Args:
-        pool: Its threads read.
-        read: Must not depend on what was read before, unless the pool has only one thread.
-        arguments: What to read.
-        ahead: Reads that may be done or under way before they are asked for.
+        pool: Pool whose threads read.
+        read: Function to call; its calls are independent, unless the pool has one thread.
+        arguments: Arguments of the calls, in order.
+        ahead: Most reads that are done or under way ahead of use.
     """
     waiting: deque[Future[Item]] = deque()
     try:
@@ -44,13 +44,13 @@ def read_ahead(
 
 
 def run_ahead(items: Iterable[Item], ahead: int) -> Generator[Item]:
-    """The same items, made in a thread of their own; it raises where `items` does.
+    """The same items, produced in a thread of their own; raises where `items` does.
 
-    What makes the items must share nothing that changes with who takes them.
+    Producer and consumer must share no mutable state.
 
     Args:
-        items: Made one after another, as always.
-        ahead: Items that may wait to be taken.
+        items: Items, produced one after another in that thread.
+        ahead: Most items that wait to be taken.
     """
     iterator = iter(items)
     with ThreadPoolExecutor(1) as pool:

@@ -34,11 +34,11 @@ def aggregate(
     """Mean cost over a square window and over the views.
 
     Args:
-        volumes: One or both sides of a sweep.
+        volumes: Cost volumes of one or both sides of a sweep.
         window_px: Side of the window, odd.
         truncation: Cost of a sample at most, and of a place that no view covers [grey levels].
-        one_side_penalty: What the mean over one side costs more than over both [grey levels].
-        workspace: Where the result is taken from.
+        one_side_penalty: Extra cost of the mean over one side alone [grey levels].
+        workspace: Memory of the result.
 
     Returns:
         (height, width, planes) uint16 in 1/128 of a grey level.
@@ -150,7 +150,7 @@ def box_mean(
         radius: The window is 2 radius + 1 wide and high.
         uncovered: Stored mean where no view covers the window.
         penalty: Stored mean that one side alone costs more.
-        mean: (height, width, planes) uint16, filled.
+        mean: (height, width, planes) uint16 mean costs, filled.
     """
     height, planes, width = first.shape
     factor = np.float32(MEAN_SCALE / COST_SCALE)

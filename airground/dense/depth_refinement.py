@@ -70,10 +70,10 @@ def pick(costs: U16, mean: U16, plane: F32, sigma: F32) -> None:
     """The winning plane of each pixel, its sub-plane position and how sure it is.
 
     Args:
-        costs: (height, width, planes) uint16: the winner has the lowest.
-        mean: (height, width, planes) uint16: the plain mean costs.
-        plane: (height, width) float32, filled: sub-plane index, NaN at either end.
-        sigma: Filled: standard deviation of the index by the noise of the mean cost.
+        costs: (height, width, planes) uint16 costs; the winner has the lowest.
+        mean: (height, width, planes) uint16 mean costs without smoothing.
+        plane: (height, width) float32 sub-plane index, NaN at either end; filled.
+        sigma: (height, width) float32 standard deviation of the index; filled.
     """
     height, width, planes = costs.shape
     reach = PARABOLA_REACH

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from airground.core.arrays import F32, F64, U32
+from airground.core.arrays import F32, U32
 from airground.core.surface import DepthMap
 from airground.dense.volume import Volume
 
@@ -21,20 +21,15 @@ MAX_BINS = 8
 MAX_DEPTH_MAPS = 15
 
 
-def bin_centres(bins: int) -> F64:
-    """(bins,) the values c_j that the bins stand for, evenly spaced in [-1, 1]."""
-    return (2 * np.arange(bins) + 1) / bins - 1.0
-
-
 class FieldHistogram:
     """n(v, j) of Eq. 1: how often each voxel got a value from each bin.
 
     Attributes:
         volume: The voxels.
-        truncation_m: Distance at which the field reaches -1 or 1.
-        bins: How many bins, at most 8.
+        truncation_m: Distance at which the field reaches -1 or 1 [m].
+        bins: Number of bins, at most 8.
         counts: (rows, planes, columns) uint32, bin j in bits 4 j to 4 j + 3.
-        depth_maps: How many depth maps went in.
+        depth_maps: Number of depth maps in the histogram.
     """
 
     def __init__(
@@ -96,11 +91,11 @@ def add_field(
     Args:
         counts: (rows, planes, columns) uint32, added to.
         depth: (height * width + 1,) float32, row by row, then one NaN for "outside".
-        width, height: Of the depth map.
+        width, height: Size of the depth map [px].
         matrix, shift: (3, 3) and (3,) float32: the voxel [y, k, x] lies at the homogeneous
             pixel z_k matrix (x, y, 1) + shift of the depth map.
-        plane_depths: (planes,) float32.
-        inverse_truncation: [1/m].
+        plane_depths: (planes,) float32 depth of each plane [m].
+        inverse_truncation: Inverse of the truncation distance [1/m].
         bins: Number of bins.
     """
     rows, planes, columns = counts.shape

@@ -97,7 +97,7 @@ def iterate(
     of its last row is there, for the block behind needs that; but with each further step it
     lacks one more row at either end. These seams are made up for when all blocks are done.
 
-    With `from_start`, the dual counts as zero and the extrapolation as phi, whatever they hold:
+    With `from_start`, the dual counts as zero and the extrapolation as phi:
     filling them first would cost two passes through memory.
     """
     rows = len(phi)

@@ -24,13 +24,13 @@ from airground.dense import sweep_kernels as kernels
 from airground.dense.workspace import Workspace
 
 ROUNDING_PX = 1e-6
-"""A pixel this far outside of an image is on its edge [px]."""
+"""Distance outside of an image that still counts as its edge [px]: rounding."""
 GAIN_BLUR_PX = 21
-"""Brightness is compared over squares of this side [px] ..."""
+"""Side of the squares over which brightness is compared [px]."""
 GAIN_STRIDE_PX = 6
-"""... this far apart [px] ..."""
+"""Distance between these squares [px]."""
 GAIN_MIN_SAMPLES = 30
-"""... and left alone where fewer of them overlap."""
+"""Least number of overlapping squares that determine a gain; with fewer it stays 1."""
 
 
 def inverse_depth_planes(near_m: float, far_m: float, count: int) -> F64:
@@ -125,9 +125,9 @@ class CostVolume:
     """Photometric errors of one reference view at every pixel and plane, over several views.
 
     Attributes:
-        costs: (height, planes, width) uint16, summed over views, sixteenths of grey levels;
+        costs: (height, planes, width) uint16 sums over views in sixteenths of grey levels;
             anything before the first view.
-        limits: One (height, planes, 2) int16 a view: the columns [lo, hi) that it covers.
+        limits: Columns [lo, hi) that each view covers, (height, planes, 2) int16 per view.
     """
 
     def __init__(self, costs: U16) -> None:
@@ -143,12 +143,12 @@ class PlaneSweep:
 
     Args:
         image: (height, width) uint8, the reference at full resolution.
-        camera: Its camera, at full resolution.
-        T_mav_camera: Its pose.
-        depths: (planes,) [m], the hypotheses, evenly spaced in inverse depth.
+        camera: Camera of the reference at full resolution.
+        T_mav_camera: Pose of the reference.
+        depths: (planes,) depth hypotheses [m], evenly spaced in inverse depth.
         parameters: The section `plane_sweep` of the configuration.
         sides: Number of cost volumes.
-        workspace: Where they are taken from.
+        workspace: Memory of the cost volumes.
     """
 
     def __init__(

@@ -33,7 +33,7 @@ def cast_surface(
         truncation_m: Distance at which phi reaches -1 or 1. Phi stands on the centres of
             the bins, so that its crossing alone is known to a voxel only; the zero of the
             line fitted to the voxels within half the truncation is known far better.
-        bins: Of the histogram.
+        bins: Number of bins of the histogram.
 
     Returns:
         Depth (rows, columns) float32 [m], NaN where there is no surface, and unit normals
@@ -118,11 +118,11 @@ def _first_hits(
     """Notes plane k where phi first falls below zero between it and the next, with support.
 
     Args:
-        here, behind: (columns,) phi on plane k and on the next.
-        word_here, word_behind: (columns,) uint32, their packed histograms.
+        here, behind: (columns,) phi on plane k and on plane k + 1.
+        word_here, word_behind: (columns,) uint32 packed histograms on both planes.
         near: Mask of the bins that vote for a surface close by.
-        votes: How many of them there must be.
-        hit: (columns,) int32, -1 where nothing was hit yet; changed.
+        votes: Least number of votes for a hit.
+        hit: (columns,) int32 plane of the first hit, -1 before it; changed.
     """
     zero, plane = np.float32(0), np.int32(k)
     crossings = np.uint32(0)

@@ -30,7 +30,7 @@ from airground.dense.volume import Volume
 from airground.dense.workspace import Workspace
 
 MAX_OPEN = 4
-"""Depth maps under construction at a time; more never overlap on a sensible path."""
+"""Most depth maps under construction at a time: no path of a MAV overlaps more."""
 
 
 class DenseReconstruction:
@@ -42,8 +42,8 @@ class DenseReconstruction:
     middle. Each stage yields its event right after its work.
 
     Args:
-        camera: Of the full-resolution images.
-        config: The whole pipeline's; the first three sections are used.
+        camera: Camera of the full-resolution images.
+        config: Configuration; `view_selection`, `plane_sweep` and `fusion` are used.
     """
 
     def __init__(self, camera: PinholeCamera, config: Config) -> None:
@@ -67,14 +67,14 @@ class DenseReconstruction:
         T_mav_camera: SE3,
         depth_range: tuple[float, float] | None = None,
     ) -> Iterator[Event]:
-        """Takes one frame in; yields what became of it.
+        """Take in one frame; yields the events that follow.
 
         Args:
-            stamp_ns: When it was taken.
-            image: (height, width).
-            T_mav_camera: Where it was taken.
-            depth_range: Nearest and farthest known point in it [m], of the sparse map of SLAM
-                (Sec. VIII-B); None where nobody knows.
+            stamp_ns: Stamp of the image [ns].
+            image: (height, width) grey image.
+            T_mav_camera: Pose of the camera in the MAV's map.
+            depth_range: Nearest and farthest point of SLAM's sparse map in the image [m]
+                (Sec. VIII-B); None where unknown.
 
         Raises:
             ValueError: The image does not have the camera's size.

@@ -49,9 +49,9 @@ def scene_extent(
     """The depth range before `reference`, or None where too little is known of it.
 
     Args:
-        reference: The view.
-        views: Others of the same scene; the one with the longest baseline is used.
-        camera: Of all of them.
+        reference: View before which the scene lies.
+        views: Other views of the scene; the one with the longest baseline is used.
+        camera: Camera of all views.
         mapped: Nearest and farthest point of the sparse map in the view [m], where there is
             a map.
     """

@@ -32,8 +32,8 @@ def smooth(mean: U16, reference: F32, parameters: Parameters, workspace: Workspa
     Args:
         mean: (height, width, planes) uint16, costs in 1/128 of a grey level.
         reference: (height, width) float32, the image whose edges make jumps cheap.
-        parameters: With the penalties.
-        workspace: Where the result is taken from.
+        parameters: Section `plane_sweep` of the configuration.
+        workspace: Memory of the result.
 
     Returns:
         (height, width, planes) uint16. Path costs are counted from the path's cheapest
@@ -70,11 +70,11 @@ def _extend(
     """One pixel of one path; `before` and `after` have one guard at either end.
 
     Args:
-        cost: (planes,) uint16 of the pixel.
-        before, after: (planes + 2,) uint16 path costs at the last pixel, and here, filled.
-        total: (planes,) uint16, the path costs are added to.
-        lowest: The lowest of `before`.
-        step, jump: Penalties.
+        cost: (planes,) uint16 costs of the pixel.
+        before, after: (planes + 2,) uint16 path costs at the previous pixel, and here (filled).
+        total: (planes,) uint16 sum of path costs, added to.
+        lowest: Lowest of `before`.
+        step, jump: Penalties of a step and of a jump.
 
     Returns:
         The lowest of `after`.

@@ -16,14 +16,14 @@ FAST = {"contract", "reassoc", "arcp", "nsz"}
 COST_SCALE = 16.0
 """Costs are stored in sixteenths of a grey level."""
 MAX_RUNS = 64
-"""More runs than this in a row mean a scale that no pair of neighbouring views has."""
+"""Most runs in a row: more would need a scale that no pair of neighbouring views has."""
 
 
 @njit(cache=True, error_model="numpy")
 def plan_columns(scale: F64, shift: F64, width: int) -> tuple[I32, I32, F32]:
     """Where the columns of the reference fall in a view, plane by plane, as gather-free runs.
 
-    Column x falls on `scale * x + shift` (in half columns, see `ViewImage`). Over a run,
+    Column x falls on `scale * x + shift` (in half columns, see `TurnedView`). Over a run,
     the whole part of that minus 2 x is constant, so that neighbours are read in order.
 
     Returns:
@@ -68,15 +68,15 @@ def add_view(
     """Adds one view's truncated absolute differences to the cost volume.
 
     Args:
-        costs: (height, planes, width) uint16, sixteenths of grey levels, added to.
-        first_view: Whether what stands in `costs` counts for nothing.
-        limits: (height, planes, 2) int16, filled: columns [lo, hi) that the view covers.
-        reference: (height, width) float32.
-        phases: (2, height, 2, width) float32, the view's even and odd rows and columns.
-        valid: (2 * height, 2) int32, columns [lo, hi) of the view with data, row by row.
-        row_scale, row_shift: (planes,) float64, as scale and shift, for rows.
-        starts, offsets, fractions: What `plan_columns` returned.
-        truncation: Grey levels.
+        costs: (height, planes, width) uint16 costs in sixteenths of grey levels, added to.
+        first_view: Whether to overwrite `costs`.
+        limits: (height, planes, 2) int16 columns [lo, hi) that the view covers; filled.
+        reference: (height, width) float32 reference image.
+        phases: (2, height, 2, width) float32 even and odd rows and columns of the view.
+        valid: (2 * height, 2) int32 columns [lo, hi) of the view with data, row by row.
+        row_scale, row_shift: (planes,) float64 maps of rows, as in `plan_columns`.
+        starts, offsets, fractions: Result of `plan_columns`.
+        truncation: Largest difference that counts [grey levels].
     """
     height, planes, width = costs.shape
     cap = np.float32(truncation)

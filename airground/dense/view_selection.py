@@ -23,9 +23,9 @@ class PosedImage:
     """An image and where it was taken.
 
     Attributes:
-        stamp_ns: When.
-        image: (height, width) uint8.
-        T_mav_camera: Where.
+        stamp_ns: Stamp of the image [ns].
+        image: (height, width) uint8 grey image.
+        T_mav_camera: Pose of the camera in the MAV's map.
     """
 
     stamp_ns: int
@@ -76,7 +76,7 @@ class ViewSet:
     """The views of one depth map.
 
     Attributes:
-        reference: The view that the depth map is of.
+        reference: Reference view of the depth map.
         complete: Whether the camera has left the radius.
     """
 

@@ -28,9 +28,9 @@ class Volume:
     """Voxels [row, plane, column] before a reference view.
 
     Attributes:
-        camera: Whose pixels the voxels' columns are.
-        T_mav_camera: The reference view.
-        near_m, far_m: Depth of the first and the last plane.
+        camera: Camera whose pixels are the voxels' columns.
+        T_mav_camera: Pose of the reference view.
+        near_m, far_m: Depth of the first and the last plane [m].
         planes: Number of planes.
     """
 
@@ -51,7 +51,7 @@ class Volume:
         """The volume before `reference` that holds what all depth maps saw.
 
         Args:
-            depth_maps: At least one of them with a finite depth.
+            depth_maps: Depth maps, at least one of them with a finite depth.
             reference: The depth map in whose view the surface will be cast.
             voxels: Columns, rows and planes.
             margin_m: Room before the nearest and behind the farthest depth [m].

@@ -12,7 +12,7 @@ from airground.core.arrays import U16
 
 
 class Workspace:
-    """Arrays of uint16 that nobody uses at the moment."""
+    """Arrays of uint16 that are free for use."""
 
     def __init__(self) -> None:
         self._free: list[U16] = []
@@ -25,5 +25,5 @@ class Workspace:
         return np.empty(shape, np.uint16)
 
     def give(self, array: U16) -> None:
-        """Hand an array back; whoever does must not use it again."""
+        """Hand an array back; it must not be used afterwards."""
         self._free.append(array)

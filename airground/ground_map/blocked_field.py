@@ -22,7 +22,7 @@ def empty_grid(voxel_m: float, blocks: int) -> o3d.t.geometry.VoxelBlockGrid:
 
     Args:
         voxel_m: Side of a voxel [m].
-        blocks: For so many there is room at first.
+        blocks: Number of blocks to make room for.
     """
     return o3d.t.geometry.VoxelBlockGrid(
         attr_names=ATTRIBUTES,
@@ -39,11 +39,11 @@ class BlockedField:
     """A truncated signed distance field in blocks; arrays are used as they are, not copied.
 
     Attributes:
-        places: (N, 3) int32, x, y, z of each block [blocks].
-        rows: (N,) int32, where the block lies in the arrays below.
-        tsdf: (C, 8, 8, 8) float32, by z, y, x; positive before the surface.
-        weight: (C, 8, 8, 8) float32, how many keyframes a voxel has.
-        colour: (C, 8, 8, 8, 3) float32, their mean, times `COLOUR_SCALE`.
+        places: (N, 3) int32 x, y, z of each block [blocks].
+        rows: (N,) int32 row of each block in the arrays below.
+        tsdf: (C, 8, 8, 8) float32 signed distance by z, y, x; positive before the surface.
+        weight: (C, 8, 8, 8) float32 number of keyframes in each voxel.
+        colour: (C, 8, 8, 8, 3) float32 mean colour times `COLOUR_SCALE`.
         voxel_m: Side of a voxel [m].
     """
 
@@ -63,7 +63,7 @@ class BlockedField:
         return cls(places, rows.astype(np.int32), tsdf[..., 0], weight[..., 0], colour, voxel_m)
 
     def copy(self) -> BlockedField:
-        """The same in memory of its own, which nobody fuses into any more."""
+        """A copy in memory of its own, which does not change any more."""
         tsdf, weight, colour = (
             values[self.rows] for values in (self.tsdf, self.weight, self.colour)
         )

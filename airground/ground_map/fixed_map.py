@@ -1,4 +1,4 @@
-"""A map of the ground that somebody else made."""
+"""A map of the ground from an external source."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from airground.core.trajectory import Trajectory
 
 
 class FixedMap:
-    """Stands in for a `GroundMap`, and stays as it is.
+    """Takes the place of a `GroundMap` and never changes.
 
     Args:
-        cloud: In the frame `ground`, in which the ground robot's poses are, too.
+        cloud: Cloud in the frame `ground`, in which the ground robot's poses are given.
     """
 
     keyframes = 0
@@ -21,17 +21,17 @@ class FixedMap:
         self._cloud = cloud
 
     def wants(self, T_ground_camera: SE3) -> bool:
-        """It wants no keyframe."""
+        """Never: the map takes no keyframe."""
         return False
 
     def add(self, image: GroundImage, T_ground_camera: SE3) -> None:
-        """Nothing can be added."""
+        """Raises TypeError: the map takes no keyframe."""
         raise TypeError("a fixed map takes no keyframes")
 
     def follow(self, trajectory: Trajectory) -> bool:
-        """It follows no correction."""
+        """Never: the map follows no correction."""
         return False
 
     def cloud(self) -> PointCloud:
-        """All of it."""
+        """The whole map."""
         return self._cloud

@@ -1,4 +1,4 @@
-"""Keyframes of the ground robot, fused where their poses are believed to be (Sec. IV).
+"""Keyframes of the ground robot, fused at their estimated poses (Sec. IV).
 
 Keyframes are fused in a truncated signed distance field, which averages the sensor's noise
 along its rays. Averaging points in cubes does not: at 4 m the noise of structured light is
@@ -37,8 +37,8 @@ class GroundMap:
     """Keyframes' depth images, fused in the frame `ground`.
 
     Args:
-        camera: The RGB-D camera, as calibrated.
-        config: When a frame becomes a keyframe, and how much of its depth to believe.
+        camera: Nominal camera of both images.
+        config: Section `ground_mapping` of the configuration.
     """
 
     def __init__(self, camera: PinholeCamera, config: GroundMapping) -> None:
@@ -51,7 +51,7 @@ class GroundMap:
 
     @property
     def keyframes(self) -> int:
-        """How many there are."""
+        """Number of keyframes in the map."""
         return len(self._keyframes)
 
     def wants(self, T_ground_camera: SE3) -> bool:
@@ -80,7 +80,7 @@ class GroundMap:
             self._fuse(keyframe, *keyframe.unpack())
 
     def follow(self, trajectory: Trajectory) -> bool:
-        """Move the keyframes to where a corrected trajectory has them.
+        """Move the keyframes to the poses of a corrected trajectory.
 
         Args:
             trajectory: `T_ground_camera` of the images tracked so far, by their stamps;

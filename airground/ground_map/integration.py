@@ -34,14 +34,14 @@ def integrate(
     """Add one view to a field in the frame `map`, in the blocks that it touches.
 
     Args:
-        grid: With the attributes that `BlockedField` names; changed.
-        blocks: (N, 3) places of the blocks; those that are missing are made.
-        depth: (height, width) [m], 0 where missing.
-        colour: (height, width, 3) RGB.
-        camera: Of both images.
-        T_map_camera: Where they were taken.
+        grid: Grid with the attributes of `BlockedField`; changed.
+        blocks: (N, 3) places of the blocks [blocks]; missing ones are created.
+        depth: (height, width) depth [m], 0 where missing.
+        colour: (height, width, 3) RGB image.
+        camera: Camera of both images.
+        T_map_camera: Pose of the camera in the map.
         voxel_m: Side of a voxel [m].
-        truncation_m: The field ends this far from the surface [m].
+        truncation_m: Distance from the surface at which the field ends [m].
     """
     if len(blocks) == 0:
         return
@@ -78,13 +78,13 @@ def add_view(
     """`integrate` on arrays.
 
     Args:
-        places: (N, 3) of the blocks [blocks].
-        rows: (N,) where they lie in the field.
-        depth, colour: As in `integrate`.
-        pinhole: fx, fy, cx, cy [px].
-        T_camera_map: (3, 4).
-        voxel_m, truncation_m: As in `integrate`.
-        field: The distance, weight and colour of `BlockedField`; changed.
+        places: (N, 3) places of the blocks [blocks].
+        rows: (N,) rows of the blocks in the field.
+        depth, colour: Images as in `integrate`.
+        pinhole: (4,) intrinsics fx, fy, cx, cy [px].
+        T_camera_map: (3, 4) upper rows of the pose.
+        voxel_m, truncation_m: Lengths as in `integrate` [m].
+        field: Distance, weight and colour of `BlockedField`; changed.
     """
     for block in prange(len(rows)):
         _add_to_block(

@@ -19,20 +19,20 @@ LEVELS = np.iinfo(np.uint16).max
 JUMP = np.float32(0.05)
 """Neighbours whose depths differ by more than this share are of different surfaces."""
 JPEG_QUALITY = 95
-"""Some 90 kB an image of 640 x 480, where lossless compression takes 550."""
+"""JPEG quality: 90 kB per image of 640 x 480, where lossless compression takes 550 kB."""
 
 
 @dataclass(frozen=True, eq=False)
 class GroundKeyframe:
-    """What was seen from one pose; about 0.25 MB where the image is 640 x 480.
+    """The images of one pose; about 0.25 MB at 640 x 480 pixels.
 
     Attributes:
-        stamp_ns: Of the image.
-        T_ground_camera: Where it was taken, as the map has it now.
+        stamp_ns: Stamp of the image [ns].
+        T_ground_camera: Newest estimate of the camera's pose.
         packed_depth: zlib of (height, width) uint16 multiples of `step_m`; 0 where missing.
-        packed_colour: JPEG.
+        packed_colour: Colour image as JPEG.
         step_m: Unit of the depth [m].
-        shape: (height, width).
+        shape: Height and width of the images [px].
     """
 
     stamp_ns: int
@@ -59,7 +59,7 @@ class GroundKeyframe:
         )
 
     def unpack(self) -> tuple[F32, U8]:
-        """`depth` and `colour`."""
+        """Depth and colour image, as `depth` and `colour` return them."""
         return self.depth(), self.colour()
 
     def depth(self) -> F32:
@@ -82,8 +82,8 @@ def usable_levels(depth: F32, max_depth_m: np.float32, step_m: np.float32) -> U1
     out, like those that are too far.
 
     Args:
-        depth: (height, width) [m], NaN where missing.
-        max_depth_m: Depth beyond this is not used.
+        depth: (height, width) depth [m], NaN where missing.
+        max_depth_m: Largest depth to use [m].
         step_m: Unit of the result [m].
     """
     height, width = depth.shape
@@ -108,5 +108,5 @@ def usable_levels(depth: F32, max_depth_m: np.float32, step_m: np.float32) -> U1
 
 @njit(cache=True, nogil=True)
 def _jumps(one: np.float32, next_one: np.float32) -> bool:
-    """Whether depth changes between neighbours; where one is missing, nobody knows."""
+    """Whether depth jumps between neighbours; false where one is missing."""
     return bool(abs(next_one - one) > JUMP * next_one)

@@ -28,8 +28,8 @@ def surface_points(field: BlockedField, min_weight: float) -> PointCloud:
     """The points of the zero level, with colours and normals, block by block.
 
     Args:
-        field: Of the ground map.
-        min_weight: Voxels with no more than this are unknown.
+        field: Distance field of the ground map.
+        min_weight: Weight up to which a voxel counts as unknown.
     """
     words = ((field.places.astype(np.int64) + _BIAS) * (_X, _Y, _Z)).sum(axis=1)
     order = np.argsort(words)
@@ -80,10 +80,10 @@ def _surround(values: F32, rows: I32, near: I32, cube: F32) -> None:
     """A block's voxels with some of those around it, NaN where no block is.
 
     Args:
-        values: (C, 8, 8, 8).
-        rows: (N,) as in `BlockedField`.
+        values: (C, 8, 8, 8) values of all blocks.
+        rows: (N,) rows of the blocks, as in `BlockedField`.
         near: (27,) the block's neighbours.
-        cube: (11, 11, 11), changed; `BEFORE` voxels lie before the block and `BEHIND` behind.
+        cube: (11, 11, 11) result, `BEFORE` voxels before the block and `BEHIND` behind it.
     """
     cube[:] = np.nan
     for number in range(27):
@@ -120,11 +120,11 @@ def find_crossings(
     """Which edges between known voxels change their sign.
 
     Args:
-        tsdf, weight: As in `BlockedField`, but (C, 512): what a block adds to the index of its
+        tsdf, weight: (C, 512) arrays of `BlockedField`, flat: what a block adds to the index of its
             voxels along x, y and z is 1, 8 and 64.
-        rows: Likewise.
+        rows: (N,) rows of the blocks, as in `BlockedField`.
         beside: (N, 27) the blocks' neighbours.
-        min_weight: Voxels with no more than this are unknown.
+        min_weight: Weight up to which a voxel counts as unknown.
 
     Returns:
         (N, 512) bits 1, 2, 4 of a voxel for its edges along x, y, z, and (N,) their number.
@@ -179,7 +179,7 @@ def _crossing(
     Args:
         cube: A block's voxels and those around it (see `_surround`).
         x, y, z: The edge's first voxel in the cube.
-        axis: Of the edge.
+        axis: Axis of the edge, 0 to 2 for x, y, z.
 
     Returns:
         The place on the edge, from 0 to 1, and the unit normal, towards free space.
@@ -201,10 +201,10 @@ def place_points(
     """The points (M, 3) float32 [voxels], colours (M, 3) uint8, unit normals (M, 3) float32.
 
     Args:
-        tsdf, colour, places, rows: As in `BlockedField`, places and rows in the order of words.
+        tsdf, colour, places, rows: Arrays of `BlockedField`, the last two in the order of words.
         beside: (N, 27) the blocks' neighbours.
-        crossed: (N, 512) as `find_crossings` returns them.
-        first: (N + 1,) the blocks' first points.
+        crossed: (N, 512) bits from `find_crossings`.
+        first: (N + 1,) index of each block's first point.
     """
     points = np.empty((first[-1], 3), np.float32)
     colours = np.empty((first[-1], 3), np.uint8)

@@ -1,4 +1,4 @@
-"""Which blocks of a distance field a depth image says something of (Sec. IV).
+"""Blocks of a distance field that a depth image measures (Sec. IV).
 
 What Open3D calls `compute_unique_block_coordinates`, and the same blocks; it gathers them in a
 hash set, where a box of marks around the view is enough.
@@ -14,7 +14,7 @@ from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 
 STRIDE = 4
-"""Every so many pixels along both axes are looked at [px]."""
+"""Step between the pixels that are read, along both axes [px]."""
 STEPS = 3
 """Steps along a ray from the near to the far end of the truncated field."""
 
@@ -30,12 +30,12 @@ def touched_blocks(
     """Blocks that a truncated signed distance field needs for a view.
 
     Args:
-        depth: (height, width) [m], 0 where missing.
-        camera: Of the image.
-        T_map_camera: Where it was taken.
+        depth: (height, width) depth [m], 0 where missing.
+        camera: Camera of the image.
+        T_map_camera: Pose of the camera in the map.
         block_m: Side of a block [m].
-        truncation_m: The field ends this far from the surface [m].
-        max_depth_m: Depth from here on is not used [m].
+        truncation_m: Distance from the surface at which the field ends [m].
+        max_depth_m: Depth from which on nothing is used [m].
 
     Returns:
         (N, 3) x, y, z of each block in the frame `map` [blocks], each once, by x, then y, then z.
@@ -64,10 +64,10 @@ def blocks_along_rays(
     """The blocks of points on both sides of what each pixel measured, one after another.
 
     Args:
-        depth: As in `touched_blocks`.
-        inverse: 1 / fx, 1 / fy, cx, cy.
-        T_map_camera: (3, 4).
-        block_m, truncation_m, max_depth_m: As in `touched_blocks`.
+        depth: Depth image as in `touched_blocks`.
+        inverse: (4,) inverse intrinsics 1 / fx, 1 / fy, cx, cy.
+        T_map_camera: (3, 4) upper rows of the pose.
+        block_m, truncation_m, max_depth_m: Lengths as in `touched_blocks` [m].
 
     Returns:
         Room for blocks (M, 3), and how many there are.

@@ -1,7 +1,7 @@
 """The calibration of both robots' sensors as it stands in TOML files.
 
-The same tables hold what the pipeline is told (`recording.toml`) and, in simulation, what
-was true; the truth lies elsewhere and is never read here.
+The same tables hold the nominal calibration (`recording.toml`) and, in simulation, the true
+one, which lies elsewhere and is never read here.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ Positive = Annotated[float, Field(gt=0)]
 Row = tuple[float, float, float, float]
 ROTATION_TOLERANCE = 1e-6
 MAX_SIDE_PX = 8192
-"""No camera here has more; images are decoded and undistorted whole."""
+"""Largest side of an image [px]: images are decoded and undistorted whole."""
 
 
 class Table(BaseModel):

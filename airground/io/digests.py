@@ -17,7 +17,7 @@ def file_digest(path: Path) -> str:
 
 
 def folder_digest(digests: Mapping[str, str]) -> str:
-    """Digest of a folder from those of its files by name, whatever their order."""
+    """Digest of a folder from the digests of its files by name, independent of their order."""
     lines = "".join(f"{digests[name]}  {name}\n" for name in sorted(digests))
     return bytes_digest(lines.encode())
 

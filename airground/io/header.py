@@ -1,4 +1,4 @@
-"""`recording.toml`: what a recording is, and what its reader is told of the sensors."""
+"""`recording.toml`: what was recorded, and the nominal calibration of the sensors."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ class Header(Table):
     """The contents of `recording.toml`.
 
     Attributes:
-        schema_version: Of the recording's layout (key `schema`).
-        scene, seed, flight: What was recorded.
+        schema_version: Version of the recording's layout (key `schema`).
+        scene, seed, flight: Name of the scene, seed of the heap, and number of the flight.
         sensors: Name of the sensor preset.
         duration_s: Length of the recording [s].
         frames: Numbers of images.
-        calibration: What the pipeline is told of the sensors.
+        calibration: Nominal calibration of the sensors.
         digests: SHA-256 of every text file and image folder by relative path.
     """
 
@@ -108,5 +108,5 @@ def parse_table(kind: type[AnyTable], values: dict[str, Any], path: Path) -> Any
 
 
 def shortened(value: object) -> str:
-    """What a file held, short enough for one line however much it was."""
+    """A value from a file, short enough for one line."""
     return _SHORT.repr(value)

@@ -1,4 +1,4 @@
-"""Decoding the images of a recording, with every complaint that they may deserve."""
+"""Decoding the images of a recording, with errors that name the file and the reason."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What sensor data must look like, whoever recorded it: units, cover, gravity, rigid poses.
+"""Checks of sensor data from any source: units, cover, gravity, rigid poses.
 
-Every complaint is one line that names the file, what is wrong and what would be right.
+Every error is one line that names the file, what is wrong and what would be right.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def check_stamp_unit(stamps_ns: I64, path: Path, unit: str, steps_s: tuple[float
     """RecordingError if the stamps tick as if they were written in another unit than `unit`.
 
     Args:
-        stamps_ns: (N,) as read, taking the file to be in `unit`.
+        stamps_ns: (N,) stamps as read, if the file is in `unit` [ns].
         path: The file, for the message.
         unit: "nanoseconds" or "seconds": what the format prescribes.
         steps_s: Shortest and longest step that the sensor can have [s].
@@ -69,10 +69,10 @@ def check_imu_covers(
     """RecordingError unless inertial samples reach from the first image to the last.
 
     Args:
-        imu: All samples.
+        imu: All inertial samples.
         imu_path: Their file, for the message.
-        camera_stamps_ns: (N,) of the images.
-        offset_ns: What to add to them to get the IMU's time.
+        camera_stamps_ns: (N,) stamps of the images [ns].
+        offset_ns: Offset from the camera's clock to the IMU's [ns].
     """
     first, last = int(camera_stamps_ns[0]) + offset_ns, int(camera_stamps_ns[-1]) + offset_ns
     late_s = (int(imu.stamps_ns[0]) - first) / 1e9
@@ -157,7 +157,7 @@ def level_body(up_imu: F64, T_imu_camera: SE3) -> SE3:
 
     Args:
         up_imu: (3,) unit vector, up in the IMU's axes.
-        T_imu_camera: The camera in the IMU.
+        T_imu_camera: Pose of the camera in the IMU's frame.
     """
     _, y_camera, z_camera = T_imu_camera.rotation.T
     ahead = z_camera - y_camera

@@ -26,11 +26,11 @@ _KINDS = {(_GREY, 8): 1, (_GREY, 16): 2, (_RGB, 8): 3}
 
 @dataclass(frozen=True)
 class PngHeader:
-    """What the file says of itself.
+    """Size and kind of an image, by the file's header.
 
     Attributes:
-        width, height: Of the image [px].
-        pixel_bytes: Bytes a pixel; None for a kind of PNG that is not decoded here.
+        width, height: Size of the image [px].
+        pixel_bytes: Bytes per pixel; None for a kind of PNG that is not decoded here.
     """
 
     width: int
@@ -47,7 +47,7 @@ class PngHeader:
 
     @property
     def row_bytes(self) -> int:
-        """Bytes a row without its filter's number."""
+        """Bytes per row without the number of its filter."""
         assert self.pixel_bytes is not None
         return self.width * self.pixel_bytes
 
@@ -65,7 +65,7 @@ def decode_png(data: bytes) -> NDArray[Any]:
     if header.pixel_bytes is None:
         raise ValueError("this kind of PNG image is not decoded here")
     size = header.height * (1 + header.row_bytes)
-    # Never more than the header promises, whatever a small file would expand to.
+    # No more than the header promises, so that a small file cannot fill the memory.
     inflater = isal_zlib.decompressobj()
     try:
         raw = inflater.decompress(_image_data(data), size + 1)
@@ -106,7 +106,7 @@ def undo_filters(filtered: U8, rows: U8, pixel_bytes: int) -> bool:
     Args:
         filtered: (height, 1 + row) uint8, each row after the number of its filter.
         rows: (height, row) uint8, written.
-        pixel_bytes: Bytes a pixel.
+        pixel_bytes: Number of bytes per pixel.
 
     Returns:
         False where a filter's number has no meaning.

@@ -1,4 +1,4 @@
-"""Writes the text files of a recording; images are written by whoever makes them."""
+"""Writes the text files of a recording; the renderer writes the images."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def finish(root: Path, header: Header, image_digests: Mapping[str, Mapping[str, 
 
     Args:
         root: The recording's folder.
-        header: Everything but the digests.
+        header: Contents of the file without the digests.
         image_digests: SHA-256 of every image by image folder and file name.
     """
     digests = {folder: folder_digest(files) for folder, files in image_digests.items()}

@@ -1,4 +1,4 @@
-"""What one robot sensed, and what two robots sensed together, whatever the layout on disk."""
+"""What one robot sensed, and what two robots sensed together, for any layout on disk."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""A one-way channel over a loopback socket that never makes its sender wait.
+"""A one-way channel over a loopback socket whose sender never blocks.
 
-The receiver acknowledges every message that it is done with. So the sender knows how many
-are under way, and leaves out what the receiver has no time for, instead of blocking or of
-filling the memory. Either side may die: the other one notices nothing but silence.
+The receiver acknowledges each message once it is processed. The sender therefore knows how many
+are under way and can drop messages instead of blocking or filling the memory. If one side dies,
+the other one only receives nothing more.
 """
 
 from __future__ import annotations
@@ -12,27 +12,27 @@ import contextlib
 import zmq
 
 LOOPBACK = "tcp://127.0.0.1"
-LAST_WORDS_MS = 5000
-"""How long what was sent last may take to leave a closing channel."""
+LINGER_MS = 5000
+"""Longest time that the last messages may take to leave a closing channel [ms]."""
 
 
 class Sender:
     """The end that sends.
 
     Args:
-        address: Of the receiver.
-        capacity: Messages that may be under way at a time.
+        address: Address of the receiver.
+        capacity: Most messages under way at a time.
 
     Attributes:
         under_way: Messages sent and not yet acknowledged.
-        most_under_way: The most there ever were.
+        most_under_way: Largest value of `under_way` so far.
     """
 
     def __init__(self, address: str, capacity: int) -> None:
         self._socket: zmq.Socket[bytes] = zmq.Context.instance().socket(zmq.DEALER)
         # The bound is `capacity`: the last message of all must get through beyond it.
         self._socket.set_hwm(0)
-        self._socket.setsockopt(zmq.LINGER, LAST_WORDS_MS)
+        self._socket.setsockopt(zmq.LINGER, LINGER_MS)
         self._socket.connect(address)
         self._capacity = capacity
         self.under_way = self.most_under_way = 0
@@ -51,7 +51,7 @@ class Sender:
         self.most_under_way = max(self.most_under_way, self.under_way)
 
     def close(self) -> None:
-        """Nothing more will be sent; what was, still leaves."""
+        """Close the socket; messages already sent still leave."""
         self._socket.close()
 
 
@@ -59,7 +59,7 @@ class Receiver:
     """The end that receives; bound to the loopback interface, at a port that is free.
 
     Attributes:
-        address: Where a sender connects to.
+        address: Address that a sender connects to.
     """
 
     def __init__(self) -> None:
@@ -79,10 +79,10 @@ class Receiver:
         return self._socket.recv_multipart(zmq.NOBLOCK)
 
     def acknowledge(self) -> None:
-        """One more message is done with."""
-        with contextlib.suppress(zmq.Again):  # the sender is gone, and does not care
+        """Report one more message as processed."""
+        with contextlib.suppress(zmq.Again):  # the sender is gone
             self._socket.send(b"", zmq.NOBLOCK)
 
     def close(self) -> None:
-        """Nobody will receive any more."""
+        """Close the socket."""
         self._socket.close()

@@ -1,7 +1,7 @@
-"""A tracked frame as a message: a header in JSON, then one block of bytes an array.
+"""A tracked frame as a message: a header in JSON, then one block of bytes per array.
 
-Numbers survive to the last bit, and so do images, unless they are to be compressed: then
-those of the MAV become JPEG, as its radio needs it.
+Numbers and images are kept to the last bit; on demand the MAV's images are compressed as JPEG,
+as its radio needs.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from airground.tracking import TrackedFrame
 
 JPEG = "jpeg"
 TYPES = ("|u1", "<f4", "<f8", "<i8")
-"""What an array may be made of."""
+"""Element types that an array may have."""
 
 Parts = list[bytes]
 
@@ -34,8 +34,8 @@ def pack(frame: TrackedFrame, jpeg_quality: int | None = None) -> Parts:
     """The message of a frame.
 
     Args:
-        frame: To be sent.
-        jpeg_quality: Of the MAV's images, 1 to 100; None sends every pixel as it is.
+        frame: Frame to send.
+        jpeg_quality: JPEG quality of the MAV's images, 1 to 100; None sends them uncompressed.
     """
     pose, image = frame.pose, frame.image
     scale = None if pose.scale is None else (pose.scale.sigma, pose.scale.observable)
@@ -67,7 +67,7 @@ def unpack(parts: Sequence[bytes]) -> TrackedFrame:
     """The frame of a message.
 
     Raises:
-        InputError: It is none.
+        InputError: The message is not a tracked frame.
     """
     try:
         header, arrays = _parse(parts)
@@ -77,7 +77,7 @@ def unpack(parts: Sequence[bytes]) -> TrackedFrame:
 
 
 def pack_trajectory(trajectory: Trajectory | None) -> Parts:
-    """The message that says where all images are believed to be."""
+    """The message of a trajectory; None is kept."""
     return _message({}, _trajectory_arrays(trajectory))
 
 
@@ -134,8 +134,8 @@ def _trajectory(arrays: dict[str, NDArray[Any]]) -> Trajectory | None:
 
 
 def _message(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Parts:
-    told = [(name, array.dtype.str, array.shape) for name, array in arrays.items()]
-    head = json.dumps(header | {"arrays": told}).encode()
+    types = [(name, array.dtype.str, array.shape) for name, array in arrays.items()]
+    head = json.dumps(header | {"arrays": types}).encode()
     return [head, *(array.tobytes() for array in arrays.values())]
 
 

@@ -12,16 +12,16 @@ from airground.localization.particles import densest_mode
 
 
 def why_refused(overlay: Overlays, agreed: Agreement, particles: F64, config: Localization) -> str:
-    """One line on why no position is claimed; empty if one is.
+    """The reason, in one line, why no position is claimed; empty if one is.
 
     The particles' covariance says whether they agree with each other, not whether they are
     right: the rest asks whether the maps fit at the estimate, better than beside it.
 
     Args:
-        overlay: The newest aerial map laid at the estimate.
-        agreed: How well the maps agree there.
-        particles: (M, 3) the belief.
-        config: Thresholds.
+        overlay: Overlap of the newest aerial map with the ground map at the estimate.
+        agreed: Agreement of the maps at the estimate.
+        particles: (M, 3) particles: x, y [m] and heading [rad].
+        config: Section `localization` of the configuration.
     """
     overlap = float(overlay.overlaps()[0])
     if not overlap > config.min_overlap:

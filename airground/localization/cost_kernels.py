@@ -34,8 +34,8 @@ def about_mean(heights: F32, margin: int) -> tuple[F32, F32, float]:
     """Heights with NaN in holes as heights about their mean, 0 in holes; the mask; the mean.
 
     Args:
-        heights: (nx, ny) [m].
-        margin: Empty cells to put around.
+        heights: (nx, ny) heights [m], NaN in holes.
+        margin: Width of the empty border [cells].
     """
     nx, ny = heights.shape
     mean, _ = mean_height(heights)

@@ -29,7 +29,7 @@ from airground.localization.turned_kernels import MARGIN, filled_cells, in_fours
 
 @dataclass(frozen=True, eq=False)
 class Masked:
-    """Heights about their mean with 0 in holes, and the mask that tells holes from zeros.
+    """Heights about their mean with 0 in holes, and the mask of the filled cells.
 
     float32 sums of squares lose the small differences that matter unless means go first.
     """
@@ -48,9 +48,9 @@ def costs_of(sums: Floats, aerial_cells: int, config: Localization) -> F32:
     """(N,) costs of the configured kind for sums (N, 6) over the overlap.
 
     Args:
-        sums: As in `cost_kernels`.
-        aerial_cells: Filled cells of the aerial map, of which `min_overlap` must overlap.
-        config: Cost, overlap rule and relief.
+        sums: (N, 6) sums as in `cost_kernels`.
+        aerial_cells: Number of filled cells of the aerial map.
+        config: Section `localization` of the configuration.
     """
     # "More than" the fraction (Sec. VI-A), where the number of cells is whole.
     min_count = np.floor(config.min_overlap * aerial_cells) + 0.5
@@ -66,7 +66,7 @@ class OffsetSearch:
     give the exact cost of all offsets. The ground's spectra are kept for further headings.
 
     Args:
-        ground: Height map in `ground`.
+        ground: Height map in the frame `ground`.
         centre: (2,) middle of the searched square [m].
         radius_m: Half its side [m].
         reach_cells: (2, 2) first and last lattice index (from the camera) that aerial maps
@@ -95,7 +95,7 @@ class OffsetSearch:
             offset + aerial.heights.shape <= self._reach[1] - self._reach[0] + 1
         ).all()
         if not inside:
-            raise ValueError("the aerial map is larger than the reach that was told")
+            raise ValueError("the aerial map is larger than the given reach")
         canvas = np.full(tuple(self._reach[1] - self._reach[0] + 1), np.nan, np.float32)
         nx, ny = aerial.heights.shape
         canvas[offset[0] : offset[0] + nx, offset[1] : offset[1] + ny] = aerial.heights
@@ -148,11 +148,11 @@ def compute_cost_map(
     """Cost of every position u of the MAV within the search region (Eq. 2, Fig. 7c).
 
     Args:
-        aerial: Heights around the MAV's camera (see `aerial_height_map`).
-        ground: Heights in `ground`, same resolution.
+        aerial: Height map around the MAV's camera (see `aerial_height_map`).
+        ground: Height map in the frame `ground`, of the same resolution.
         centre: (2,) the ground robot's position in `ground` [m].
-        heading: That the aerial map was turned by [rad]; recorded only.
-        config: Cost, overlap rule, search radius.
+        heading: Turn of the aerial map [rad]; recorded only.
+        config: Section `localization` of the configuration.
     """
     search = OffsetSearch(ground, centre, config.search_radius_m, reach_of(aerial))
     return search.cost_map(aerial, heading, config)
@@ -169,9 +169,9 @@ class Overlays:
     """Overlaps of an aerial and a ground height map at single hypotheses.
 
     Attributes:
-        sums: (M, 6) as in `cost_kernels`, heights about the maps' means.
-        mean_aerial, mean_ground: Those means [m], the ground's where an overlay can reach.
-        aerial_cells: Filled cells of the aerial map.
+        sums: (M, 6) sums as in `cost_kernels`, of heights about the maps' means.
+        mean_aerial, mean_ground: Mean heights [m], of the ground where an overlay can reach.
+        aerial_cells: Number of filled cells of the aerial map.
     """
 
     sums: F64
@@ -243,9 +243,9 @@ def _within_reach(ground: HeightMap, places: F64, reach_cells: I64) -> tuple[F32
     Particles gather; preparing all of the ground map for them would take longer than using it.
 
     Args:
-        ground: All of it.
-        places: (M, 2) on its lattice [cells].
-        reach_cells: (2, 2) as for `OffsetSearch`.
+        ground: The whole ground height map.
+        places: (M, 2) places on its lattice [cells].
+        reach_cells: (2, 2) reach as for `OffsetSearch` [cells].
     """
     edge = lattice_index(ground)
     low = np.floor(places.min(axis=0)).astype(np.int64) + reach_cells[0] - edge

@@ -1,4 +1,4 @@
-"""Where magnetic north lies in a robot's own map (Sec. VI-A: the heading is known)."""
+"""Direction of magnetic north in a robot's own map (Sec. VI-A: the heading is known)."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ class HeadingEstimator:
         """Take in magnetic field samples.
 
         Args:
-            field_imu: (N, 3) [T] in the IMU's frame; samples with a NaN are left out.
-            T_map_imu: Where the IMU was in the map when they were taken.
+            field_imu: (N, 3) magnetic field in the IMU's frame [T]; NaN samples are left out.
+            T_map_imu: Pose of the IMU in the map at that time.
         """
         if self._place is None or _elsewhere(self._place, T_map_imu):
             self._place, self._samples_here = T_map_imu, 0

@@ -24,11 +24,11 @@ class HeightMapPair:
     for, and kept.
 
     Attributes:
-        stamp_ns: Of the surface.
-        points_mav: (N, 3) its points in `mav` [m].
-        position_mav: (3,) the camera that it was seen from, in `mav` [m].
+        stamp_ns: Stamp of the surface [ns].
+        points_mav: (N, 3) points of the surface in `mav` [m].
+        position_mav: (3,) position of the surface's camera in `mav` [m].
         points_ground: (M, 3) the ground robot's map in `ground` [m].
-        ground_robot_position: (2,) middle of the search region in `ground` [m].
+        ground_robot_position: (2,) centre of the search region in `ground` [m].
         heading: Turn of `mav` in `ground` [rad]; not used where it is searched.
         config: The pipeline's parameters; height maps and localization are used.
     """

@@ -77,8 +77,8 @@ def search_headings(
     are. Costs are exact for each heading that the volume holds.
 
     Args:
-        aerial: Heights around the camera for heading 0.
-        ground, centre, config: As for `search_positions`.
+        aerial: Height map around the camera for heading 0.
+        ground, centre, config: Ground map, centre and parameters as for `search_positions`.
     """
     cells = _cells(aerial)
     reach = (

@@ -24,11 +24,11 @@ class MonteCarloLocalizer:
 
     Args:
         config: The pipeline's parameters; height maps and localization are used.
-        rng: The one source of randomness.
+        rng: Source of all random numbers.
 
     Attributes:
-        config: As given.
-        belief: After the newest aerial surface, None before the first.
+        config: The pipeline's parameters.
+        belief: Belief after the newest aerial surface, None before the first.
     """
 
     def __init__(self, config: Config, rng: np.random.Generator) -> None:

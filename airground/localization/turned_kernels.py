@@ -23,8 +23,8 @@ def filled_cells(heights: F32, first_x: int, first_y: int) -> tuple[F32, float]:
     """The filled cells of an aerial map (3, K): x, y [cells], height about the mean; the mean.
 
     Args:
-        heights: (nx, ny) [m], NaN in holes.
-        first_x, first_y: Of cell [0, 0], from the camera [cells].
+        heights: (nx, ny) heights [m], NaN in holes.
+        first_x, first_y: Position of cell [0, 0] relative to the camera [cells].
     """
     mean, count = mean_height(heights)
     cells = np.empty((3, count), np.float32)
@@ -43,7 +43,7 @@ def in_fours(heights: F32) -> tuple[F32, float]:
     """Ground heights about their mean (nx + 4, ny + 4, 4), each with those beside and behind.
 
     Args:
-        heights: (nx, ny) [m], NaN in holes.
+        heights: (nx, ny) heights [m], NaN in holes.
 
     Returns:
         Each cell, the next of its row, and the two behind these in the next row; NaN in holes and
@@ -70,9 +70,9 @@ def sums_at_poses(cells: F32, fours: F32, poses: F64) -> F64:
     """The six sums (M, 6) for M poses of a turned aerial map.
 
     Args:
-        cells: (3, K) as `filled_cells` returns them.
-        fours: (rows, columns, 4) as `in_fours` returns them.
-        poses: (M, 3) index of the camera in `fours` [cells], and heading [rad].
+        cells: (3, K) cells from `filled_cells`.
+        fours: (rows, columns, 4) heights from `in_fours`.
+        poses: (M, 3) position of the camera in `fours` [cells], and heading [rad].
     """
     sums = np.zeros((len(poses), 6))
     rows, columns, _ = fours.shape

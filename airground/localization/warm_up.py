@@ -17,8 +17,8 @@ def warm_up_localization(config: Config, rng: np.random.Generator) -> None:
     """Locates a bump on itself twice: with particles to draw, then with particles to move.
 
     Args:
-        config: The pipeline's, which says what there is to compile.
-        rng: Draws the particles.
+        config: Configuration; it selects the kernels.
+        rng: Source of the particles.
     """
     few = {"search_radius_m": 0.2, "headings": 4}
     localization = config.localization.model_copy(update=few)

@@ -25,11 +25,11 @@ def refine(
     """Align an aerial cloud with the ground map.
 
     Args:
-        stamp_ns: Of the aerial surface.
+        stamp_ns: Stamp of the aerial surface [ns].
         T_ground_mav_start: First guess.
-        aerial: In the frame `mav`.
-        ground: In the frame `ground`.
-        config: Its section `refinement` is used.
+        aerial: Aerial cloud in the frame `mav`.
+        ground: Ground map in the frame `ground`.
+        config: Configuration; its section `refinement` is used.
 
     Returns:
         The refined motion and whether it may be used. Clouds that are too small or do not
@@ -45,12 +45,10 @@ def refine(
         refusal = "no overlap: the ground map has nothing below the aerial surface"
         return _refused(stamp_ns, T_ground_mav_start, refusal)
 
-    # A better start than the guess: nearby, the height maps say where.
-    start = (
-        _levelled(T_ground_mav_start, aerial.points)
-        if settings.level_prior
-        else (T_ground_mav_start)
-    )
+    # A better start than the guess, by the height maps nearby.
+    start = T_ground_mav_start
+    if settings.level_prior:
+        start = _levelled(start, aerial.points)
     source = make_surfels(aerial.points, settings.voxel_m)
     if settings.local_search:
         found = search_nearby(source.points, nearby, start, settings)
@@ -60,8 +58,8 @@ def refine(
 
     # Point-to-plane ICP.
     target = make_surfels(nearby, settings.voxel_m)
-    fit = point_to_plane_icp(source.points, target, start, settings)
-    return _judged(stamp_ns, fit.T_target_source, source, target, settings)
+    motion = point_to_plane_icp(source.points, target, start, settings)
+    return _judged(stamp_ns, motion, source, target, settings)
 
 
 def _refused(stamp_ns: int, motion: SE3, refusal: str) -> Alignment:

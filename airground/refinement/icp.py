@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numba import njit
 
@@ -13,58 +11,46 @@ from airground.core.se3 import SE3
 from airground.refinement.surfels import Surfels
 
 SETTLED_M = 1e-4
+"""Largest motion of a point by the last step [m]: far below the accuracy of an alignment."""
 MIN_CORRESPONDENCES = 50
-SPARSE = 3
-SPARSE_ABOVE_M = 0.1
+"""Least number of correspondences for a step: six unknowns, with room for outliers."""
+SPARSE, SPARSE_ABOVE_M = 3, 0.1
+"""Only every third point is used while the correspondence distance is larger than this [m]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Fit:
-    """Where ICP ended.
-
-    Attributes:
-        T_target_source: The motion found.
-        settled: Whether the last step was small.
-        correspondences: How many the last step used.
-    """
-
-    T_target_source: SE3
-    settled: bool
-    correspondences: int
-
-
-def point_to_plane_icp(source: F64, target: Surfels, start: SE3, config: Refinement) -> Fit:
+def point_to_plane_icp(source: F64, target: Surfels, start: SE3, config: Refinement) -> SE3:
     """Move a cloud until the distances along the target's normals are least.
 
     Args:
         source: (N, 3) points to move [m].
-        target: What to move them onto.
+        target: Surfels to move the points onto.
         start: First guess of T_target_source.
-        config: Distances, share kept, and number of steps.
+        config: Section `refinement` of the configuration.
+
+    Returns:
+        T_target_source; the last motion found where the correspondences do not suffice.
     """
     motion = start
     distance = config.max_distance_m
     # The distance falls by a constant factor over two thirds of the steps, then stays.
     falling = max(1, (2 * config.iterations) // 3)
     factor = (config.final_distance_m / config.max_distance_m) ** (1.0 / falling)
-    used = 0
     for _ in range(config.iterations):
         # While the distance is still large, a part of the points says as much as all.
         moved = motion @ (source[::SPARSE] if distance > SPARSE_ABOVE_M else source)
         index, squared = target.nearest(moved)
         at_final = distance <= config.final_distance_m * 1.001
-        # Nothing is trimmed before: on a floor with one box, the box is what lies farthest off
-        # at first, and all that tells where to move.
+        # Nothing is trimmed before: on a floor with one box, the box is farthest off at first, and
+        # alone shows where to move.
         keep = _closest(squared, distance, config.trim if at_final else 1.0)
-        used = int(keep.sum())
-        if used < MIN_CORRESPONDENCES:
-            return Fit(motion, False, used)
+        if keep.sum() < MIN_CORRESPONDENCES:
+            break
         step = _solve(moved[keep], target.points[index[keep]], target.normals[index[keep]])
         motion = step @ motion
         if at_final and np.abs(step @ moved[keep] - moved[keep]).max() < SETTLED_M:
-            return Fit(motion, True, used)
+            break
         distance = max(distance * factor, config.final_distance_m)
-    return Fit(motion, False, used)
+    return motion
 
 
 def _closest(squared: F64, distance: float, share: float) -> Mask:

@@ -1,4 +1,4 @@
-"""Clouds as ICP wants them: thinned evenly, each point with the plane around it."""
+"""Clouds for ICP: thinned evenly, each point with the plane around it."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ class Surfels:
     """Points with normals, and a tree to find the nearest.
 
     Attributes:
-        points: (N, 3) float64 [m].
+        points: (N, 3) float64 points [m].
         normals: (N, 3) float64 unit vectors, z up; zero where the plane is unknown.
-        tree: Over `points`.
+        tree: Nearest-neighbour tree over `points`.
     """
 
     points: F64
@@ -42,7 +42,7 @@ def make_surfels(points: F32, voxel_m: float) -> Surfels:
     """Average points over cubes and fit a plane to each one's neighbours.
 
     Args:
-        points: (N, 3) [m], at least one.
+        points: (N, 3) points [m], at least one.
         voxel_m: Side of the cubes [m].
     """
     # One thread where the result would depend on how many there are.

@@ -10,10 +10,10 @@ from airground.core.arrays import F32, U8, Mask
 QUALITY = 2e-4
 """Smallest eigenvalue of a corner's gradient matrix: below it, noise is as strong."""
 NOT_PREFERRED = 0.03
-"""What a corner without depth is worth: it only helps when nothing better is near."""
+"""Factor on the strength of a corner without depth: chosen only where nothing else is near."""
 BLOCK_PX = 5
 BORDER_PX = 12
-"""No corner so close to the border: the patch around it would leave the image."""
+"""Least distance of a corner from the border [px]: its patch must lie in the image."""
 
 
 def detect_corners(
@@ -25,10 +25,10 @@ def detect_corners(
     of a cell is stable where "every pixel above a threshold" is not.
 
     Args:
-        image: (height, width) grey.
-        occupied: (N, 2) pixels of the corners that are followed already.
-        wanted: At most this many new ones, the strongest cells first.
-        preferred: (height, width) where corners are worth more, having depth.
+        image: (height, width) grey image.
+        occupied: (N, 2) pixels of the corners followed already.
+        wanted: Most new corners, from the strongest cells.
+        preferred: (height, width) mask of the pixels with depth, where corners are worth more.
         spacing_px: Side of a cell; also the least distance to an occupied pixel.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Taking out keyframes that show nothing which others do not show as well.
+"""Removing redundant keyframes.
 
 The rule of ORB-SLAM (Mur-Artal, Montiel and Tardos, T-RO 2015, Sec. VI-E), with one difference:
 there, others must have seen a keyframe's points; here it is enough that they look where the
@@ -21,9 +21,9 @@ from airground.slam.sparse_map import SparseMap
 from airground.slam.tracked_path import TrackedPath
 
 COVERED_SHARE = 0.9
-"""Of the points that a keyframe saw, at least so many must be in view of others ..."""
+"""Least share of a keyframe's points that must be in view of others for it to be culled."""
 COVERED_BY = 5
-"""... namely of so many others."""
+"""Number of other keyframes that must have such a point in view."""
 
 
 class KeyframeCuller:
@@ -33,7 +33,7 @@ class KeyframeCuller:
     whole map still needs for its inertial motion.
 
     Args:
-        sparse_map, adjuster, recovery, path: Changed in place.
+        sparse_map, adjuster, recovery, path: Map and what depends on it, changed in place.
         camera, T_rig_camera: The robot's camera.
         parameters: The robot's section of the configuration.
     """

@@ -11,17 +11,17 @@ REACH_PX = 4
 STEPS = (-REACH_PX, -1, 0, 1, REACH_PX)
 """Where depth is looked at beside a corner, along both axes [px]."""
 MAX_SPREAD = 0.05
-"""Corners like to sit on silhouettes, and colour and depth are not taken at the same moment:
-where depth varies more than this share of it within reach, it may belong to either side."""
+"""Largest relative spread of depth around a corner. Corners often lie on silhouettes, and colour
+and depth are not taken at the same moment: the depth may belong to either side."""
 
 
 def inverse_depths_at(depth: F32, pixels: Floats, max_depth_m: float) -> F64:
     """(N,) inverse depth [1/m] at (N, 2) pixels; NaN where none can be trusted.
 
     Args:
-        depth: (height, width) [m], NaN where missing.
-        pixels: (x, y) of the corners.
-        max_depth_m: Depth beyond this is not used.
+        depth: (height, width) depth [m], NaN where missing.
+        pixels: (N, 2) pixels (x, y) of the corners.
+        max_depth_m: Largest depth to use [m].
     """
     inverse = np.empty(len(pixels))
     _look_up(np.asarray(depth, np.float32), np.asarray(pixels, np.float64), max_depth_m, inverse)

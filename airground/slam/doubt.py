@@ -1,4 +1,4 @@
-"""A place that was found where nothing before leads to: believed when images confirm it."""
+"""A relocalization far from the prediction is accepted only when further images confirm it."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from airground.core.se3 import SE3, rotation_angle
 from airground.slam.rig_state import RigState
 
 MAX_JUMP_M = 0.25
-"""No robot here moves so far between prediction and measurement from image to image."""
+"""Largest distance from the prediction of one image [m]: no robot here moves farther."""
 MAX_DRIFT_MPS = 0.1
-"""Nobody knows how fast it went on while nothing was seen; this much error adds up."""
+"""Growth of that distance while nothing is seen and the velocity is unknown [m/s]."""
 MAX_TURN_RAD = np.deg2rad(5.0)
-"""A gyro is not off by so much, not even after seconds."""
+"""Largest turn from the prediction [rad]: more than a gyro's error after seconds."""
 CONFIRMATIONS = 3
-"""Images that must be tracked from a surprising place before it counts."""
+"""Images that must be tracked from a surprising place before it is accepted."""
 
 
 def jumps(T_map_camera: SE3, expected: SE3, more_m: float = 0.0) -> bool:
@@ -29,9 +29,9 @@ def surprising(T_map_camera: SE3, expected: SE3, unseen_s: float) -> bool:
     """Whether a pose is not where the robot's motion would have carried it.
 
     Args:
-        T_map_camera: As found.
-        expected: As predicted.
-        unseen_s: How long the prediction is without a look at the scene [s].
+        T_map_camera: Pose found.
+        expected: Predicted pose.
+        unseen_s: Time since the last image with a pose [s].
     """
     turn = rotation_angle(T_map_camera.rotation.T @ expected.rotation)
     return jumps(T_map_camera, expected, MAX_DRIFT_MPS * unseen_s) or turn > MAX_TURN_RAD
@@ -39,14 +39,14 @@ def surprising(T_map_camera: SE3, expected: SE3, unseen_s: float) -> bool:
 
 @dataclass(eq=False)
 class Doubt:
-    """What to go back to if images do not confirm a place.
+    """The state to return to if images do not confirm a place.
 
     Attributes:
-        state: The state before it was found ...
-        stamp_ns, seen_ns: ... of which image, and the last one before that gave a pose.
-        found_state: The state that is in doubt ...
-        found_ns: ... and of which image.
-        confirmations: Images tracked from there.
+        state: State before the place was found.
+        stamp_ns, seen_ns: Stamps of that state's image and of the last image with a pose [ns].
+        found_state: State in doubt.
+        found_ns: Stamp of its image [ns].
+        confirmations: Number of images tracked from there.
     """
 
     state: RigState

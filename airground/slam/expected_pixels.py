@@ -1,4 +1,4 @@
-"""Where followed corners should be in the next image."""
+"""Expected pixels of followed corners in the next image."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def expected_pixels(
     Map points go by their place, other corners as if they were as far as most map points.
 
     Args:
-        sparse_map: Where some of the corners are.
-        tracker: Stands at the newest image.
-        camera: Of both images.
+        sparse_map: Map with the positions of some corners.
+        tracker: Corners in the newest image.
+        camera: Camera of both images.
         here: `T_map_camera` of the newest image.
         there: `T_map_camera` of the next one, as predicted.
     """

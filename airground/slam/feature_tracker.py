@@ -20,7 +20,7 @@ class FeatureTracker:
     Attributes:
         image: The newest image; None before the first.
         ids: (N,) numbers of the points.
-        pixels: (N, 2) float32 where they are.
+        pixels: (N, 2) float32 pixels of the corners.
         failures: (N,) images in a row in which a point did not fit the pose.
     """
 
@@ -45,8 +45,8 @@ class FeatureTracker:
         """Follow every corner into the next image; those not found are given up.
 
         Args:
-            image: (height, width) grey.
-            start: (N, 2) where the corners are expected.
+            image: (height, width) grey image.
+            start: (N, 2) expected pixels of the corners.
             extra_levels: More pyramid levels, where the expectation is poor.
         """
         if self.image is not None and len(self.ids):

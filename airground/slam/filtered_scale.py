@@ -12,24 +12,24 @@ from airground.slam.keyframe_slam import KeyframeSlam
 from airground.slam.tight_scale import UNKNOWN_TILT, pose_sigma
 
 SETTLING_S = 5.0
-"""The filter is not asked before it has seen this much motion [s]."""
+"""Motion that the filter must see before its result is used [s]."""
 FILTER_TILT = np.deg2rad(1.0)
-"""What the filter leaves open in the vertical, in simulation [rad]."""
+"""Standard deviation of the filter's vertical, in simulation [rad]."""
 GIVE_OUT_SIGMA = 0.03
 """Poses are given out when the scale is known this well [share]; more takes half a minute."""
 
 
 class FilteredScale:
-    """Loosely coupled: vision alone makes the map, the filter tells its unit and vertical.
+    """Loosely coupled: vision alone makes the map, the filter gives its unit and vertical.
 
     The map is scaled once, when the scale is known; later corrections would tear apart what
     was built on it.
 
     Args:
-        slam: Whose map; changed in place.
+        slam: SLAM with the map, changed in place.
 
     Attributes:
-        estimate: How well the scale is known; None before there was anything to judge by.
+        estimate: How well the scale is known; None before the first inertial motion.
         known: Whether poses may be given out.
         tilt_sigma: How well the vertical is known, per axis [rad].
     """

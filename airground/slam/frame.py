@@ -1,4 +1,4 @@
-"""One image as SLAM takes it."""
+"""The images of one stamp as SLAM's input."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from airground.errors import InputError
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """One image as the engine takes it.
+    """One grey image, with depth where there is a depth camera.
 
     Attributes:
-        stamp_ns: Of the image.
-        image: (height, width) grey.
-        depth: (height, width) [m], NaN where missing; None without a depth camera.
+        stamp_ns: Stamp of the image [ns].
+        image: (height, width) grey image.
+        depth: (height, width) depth [m], NaN where missing; None without a depth camera.
     """
 
     stamp_ns: int
@@ -24,11 +24,7 @@ class Frame:
 
 
 def require_order(stamp_ns: int, last_ns: int | None) -> None:
-    """Refuse an image that is not newer than the one before; None where there is none.
-
-    Raises:
-        InputError: It is not.
-    """
+    """InputError unless an image is newer than the one before (None: there is none)."""
     if last_ns is not None and stamp_ns <= last_ns:
         raise InputError(
             f"image at {stamp_ns} ns comes after one at {last_ns} ns: stamps must increase"

@@ -20,7 +20,7 @@ MIN_SHARE = 0.4
 """A pose that fewer of the points agree on is chance."""
 PNP_ROUNDS = 100
 POSITION_SIGMA_M = 0.02
-"""What inertial prediction leaves open from one image to the next [m]."""
+"""Standard deviation of an inertially predicted position, from one image to the next [m]."""
 
 
 def frame_pose(
@@ -40,20 +40,20 @@ def frame_pose(
     """Reject outliers, by the known rotation where there is a gyro, and fit the rest.
 
     Args:
-        points_map: (N, 3) map points.
-        pixels: (N, 2) where they are in the image.
-        camera: Of the image.
-        T_map_camera_predicted: Where the camera should be.
-        sigma_px: Noise of a pixel.
+        points_map: (N, 3) map points [m].
+        pixels: (N, 2) pixels of the points in the image.
+        camera: Camera of the image.
+        T_map_camera_predicted: Predicted pose of the camera.
+        sigma_px: Standard deviation of a pixel per axis [px].
         rotation_sigma: How well the predicted rotation is known [rad]; None if it is not.
         inertial: Whether the predicted position is good to centimetres.
-        min_points: With fewer inliers there is no pose.
-        rng: Draws the samples.
-        inverse_depths: (N,) measured [1/m], NaN where not; None without a depth camera.
-        inverse_depth_sigma: Their noise [1/m].
+        min_points: Least number of inliers of a pose.
+        rng: Source of RANSAC's samples.
+        inverse_depths: (N,) measured inverse depths [1/m], NaN without one; None without any.
+        inverse_depth_sigma: Standard deviation of the inverse depths [1/m].
 
     Returns:
-        The fit, its `inliers` over all N; None where the image does not tell the pose.
+        The fit, its `inliers` over all N; None where the image does not determine the pose.
     """
     if len(points_map) < min_points:
         return None

@@ -1,7 +1,7 @@
-"""The seam through which poses enter the pipeline (Sec. IV).
+"""The interface through which poses enter the pipeline (Sec. IV).
 
-A front end eats the sensor messages of one robot and says, for every image, where the
-camera was. Visual SLAM, a trajectory file and an oracle all look the same from here.
+A front end takes the sensor messages of one robot and returns the camera's pose for every
+image. Visual SLAM, a trajectory file and an oracle have the same interface.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from airground.core.trajectory import Trajectory
 
 
 class Tracking(Enum):
-    """How a front end got on with one image."""
+    """Result of a front end for one image."""
 
     INITIALIZING = "initializing"
     TRACKED = "tracked"
@@ -44,8 +44,8 @@ class TrackedCorners:
     """Corners that were followed into one image.
 
     Attributes:
-        pixels: (N, 2) float32 where they are [px].
-        mapped: (N,) whether each is in the map, so that it counts for the pose.
+        pixels: (N, 2) float32 pixels of the corners [px].
+        mapped: (N,) bool, whether a corner is in the map and so counts for the pose.
     """
 
     pixels: F32
@@ -59,22 +59,22 @@ class TrackedCorners:
 
 @dataclass(frozen=True, eq=False)
 class TrackedPose:
-    """Where the camera was when one image was taken.
+    """The camera's pose at one image.
 
     Attributes:
-        stamp_ns: Of the image.
+        stamp_ns: Stamp of the image [ns].
         tracking: Whether the pose can be used.
-        T_map_camera: The camera in the robot's own map (`mav` or `ground`): metric, z up
+        T_map_camera: Pose of the camera in the robot's own map (`mav` or `ground`): metric, z up
             against gravity. None unless tracked.
-        covariance: (6, 6) of the pose error in the map's axes: position [m], then rotation
+        covariance: (6, 6) covariance of the error in the map's axes: position [m], then rotation
             vector of estimate times inverse truth [rad]. None where the front end has none.
         scale: How well the metric scale is known; None where depth or a file gives it.
         depth_range: Nearest and farthest map point in this image, along the optical axis
             [m] (Sec. VIII-B). None where the front end has no map.
-        corrected: Whether the map changed with this image, and earlier poses with it:
-            `FrontEnd.trajectory` has them.
-        corners: What was followed into the image, to look at; None where the front end
-            follows nothing, or is another process.
+        corrected: Whether this image changed the map and earlier poses, which
+            `FrontEnd.trajectory` returns.
+        corners: Corners followed into the image, for display; None where the front end has
+            none, or runs in another process.
     """
 
     stamp_ns: int
@@ -104,13 +104,13 @@ class FrontEnd(Protocol[Image_contra]):
         """Take the inertial measurements up to the next image."""
 
     def track(self, image: Image_contra) -> TrackedPose:
-        """Where the camera was when `image` was taken."""
+        """The pose of the camera at `image`."""
 
     def finish(self) -> None:
-        """There are no more images: optimize what was put off."""
+        """Finish after the last image: run deferred optimization."""
 
     def trajectory(self) -> Trajectory | None:
-        """Every image tracked so far, at the pose that is believed now; None before the first.
+        """The newest poses of all images tracked so far; None before the first.
 
-        Live poses, once returned by `track`, stay as they are; these follow corrections.
+        Poses returned by `track` do not change; these follow corrections.
         """

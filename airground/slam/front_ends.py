@@ -26,12 +26,12 @@ from airground.slam.rgbd import RgbdSlam
 
 @dataclass(frozen=True)
 class Ingredients:
-    """What a front end may be made of.
+    """Inputs of a front end.
 
     Attributes:
-        calibration: Of the robot.
-        config: The whole pipeline's.
-        rng: Draws samples wherever outliers are to be told.
+        calibration: Nominal calibration of the robot.
+        config: The pipeline's configuration.
+        rng: Source of the samples of outlier rejection.
         trajectory: Poses `T_map_camera` of an external system; None where there are none.
     """
 
@@ -47,7 +47,7 @@ class Ingredients:
             InputError: There is none.
         """
         if self.trajectory is None:
-            raise InputError("the front end 'file' needs the trajectory that it shall follow")
+            raise InputError("the front end 'file' needs a trajectory")
         return self.trajectory
 
 
@@ -55,7 +55,7 @@ MAV: dict[str, Callable[[Ingredients], FrontEnd[MavImage]]] = {
     "slam": lambda given: MonocularSlam(given.calibration, given.config, given.rng),
     "file": lambda given: TrajectoryFile(given.given_trajectory()),
 }
-"""Of the MAV: grey images and IMU."""
+"""Front ends of the MAV: grey images and IMU."""
 
 GROUND: dict[str, Callable[[Ingredients], FrontEnd[GroundImage]]] = {
     "slam": lambda given: RgbdSlam(given.calibration, given.config, given.rng),
@@ -63,7 +63,7 @@ GROUND: dict[str, Callable[[Ingredients], FrontEnd[GroundImage]]] = {
     "opencv": lambda given: opencv_odometry(given.calibration),
     "file": lambda given: TrajectoryFile(given.given_trajectory()),
 }
-"""Of the ground robot: colour and depth."""
+"""Front ends of the ground robot: colour and depth."""
 
 Image = TypeVar("Image", MavImage, GroundImage)
 
@@ -74,7 +74,7 @@ def make_front_end(
     """The front end called `name`.
 
     Raises:
-        InputError: The table has none of that name, or an ingredient is missing.
+        InputError: The name is unknown, or an input is missing.
     """
     if name not in table:
         raise InputError(f"--front-end {name}: unknown; known: {', '.join(table)}")

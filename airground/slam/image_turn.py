@@ -1,4 +1,4 @@
-"""How the camera turned between two images, by the images alone.
+"""The turn of the camera between two images, from the images alone.
 
 For robots without a gyro: the small blurred image slides as a whole when the camera turns
 (Klein and Murray, "Improving the agility of keyframe-based SLAM", ECCV 2008).
@@ -23,7 +23,7 @@ class ImageTurn:
     """Follows the turn from image to image.
 
     Args:
-        camera: Of the images.
+        camera: Camera of the images.
     """
 
     def __init__(self, camera: PinholeCamera) -> None:
@@ -53,10 +53,10 @@ class ImageTurn:
         """(3, 3) turn of the rig to the next image; about the optical axis as last time.
 
         Args:
-            image: (height, width) grey, the next one.
-            last_turn: (3, 3) of the rig, to the image before; the answer where images do not
-                tell.
-            R_rig_camera: (3, 3).
+            image: (height, width) grey image.
+            last_turn: (3, 3) turn of the rig to the previous image; returned where the images are
+                not clear.
+            R_rig_camera: (3, 3) rotation of the camera in the rig.
         """
         slide = self.follow(image)
         if slide is None:

@@ -1,4 +1,4 @@
-"""How much an image shows that the last keyframe did not."""
+"""The choice of keyframes, by what changed since the last one."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class News:
     """What changed since the last keyframe.
 
     Attributes:
-        share_left: Share of its corners that are still followed.
-        mapped_left: Map points followed now, as a share of those it saw.
-        parallax_px: Median way of the corners, turning taken out [px]; 0 without any.
+        share_left: Share of the keyframe's corners that are still followed.
+        mapped_left: Number of map points followed now, relative to the keyframe's.
+        parallax_px: Median motion of the corners, without that by turning [px]; 0 without corners.
     """
 
     share_left: float
@@ -38,9 +38,9 @@ class KeyframeChoice:
     """Chooses the images that stay.
 
     Args:
-        sparse_map: With the keyframes so far.
+        sparse_map: Map with the keyframes so far.
         camera, T_rig_camera: The robot's camera.
-        parameters: Of its SLAM.
+        parameters: The robot's section of the configuration.
     """
 
     def __init__(
@@ -59,9 +59,9 @@ class KeyframeChoice:
         """Whether the newest image shows enough that the last keyframe did not.
 
         Args:
-            tracker: Stands at the newest image.
-            state: Of the rig there.
-            stamp_ns: Of the image.
+            tracker: Corners in the newest image.
+            state: State of the rig at that image.
+            stamp_ns: Stamp of the image [ns].
             timed: Whether a keyframe is due now and then, even if nothing is new.
         """
         last, parameters = self._map.keyframes[-1], self._parameters
@@ -89,11 +89,11 @@ def what_is_new(
     """Compare the newest image with the last keyframe.
 
     Args:
-        sparse_map: Of both.
+        sparse_map: Map of both images.
         last: The last keyframe.
-        tracker: Stands at the newest image.
+        tracker: Corners in the newest image.
         R_last_here: (3, 3) turn of the camera since the keyframe.
-        camera: Of both images.
+        camera: Camera of both images.
     """
     _, here, there = np.intersect1d(tracker.ids, last.ids, return_indices=True)
     moved = _turned(tracker.pixels[here], R_last_here, camera) - last.pixels[there]

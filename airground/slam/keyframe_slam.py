@@ -42,25 +42,25 @@ from airground.slam.tracked_path import TrackedPath
 PATIENCE = 2
 """A point that fits the pose badly in this many images in a row is given up."""
 GUIDED_LEVELS, UNGUIDED_LEVELS = 1, 3
-"""Pyramid levels above the image: a gyro tells where corners go, constant motion guesses."""
+"""Pyramid levels above the image, with a gyro and without: prediction by a gyro is better."""
 
 
 class KeyframeSlam:
     """The machinery that both robots share.
 
     Args:
-        calibration: Of the robot.
-        parameters: Its section of the configuration.
-        rng: Draws samples wherever outliers are to be told.
-        inverse_depth_sigma: Noise of measured inverse depth [1/m].
-        max_depth_m: Depth beyond this starts no point.
+        calibration: Nominal calibration of the robot.
+        parameters: The robot's section of the configuration.
+        rng: Source of the samples of outlier rejection.
+        inverse_depth_sigma: Standard deviation of measured inverse depth [1/m].
+        max_depth_m: Largest depth that starts a point [m].
 
     Attributes:
         map: Keyframes and points.
         tracker: The corners that are followed.
-        motion: Predicts the next state.
-        state: The newest.
-        stamp_ns: Of the newest state; None before the map began.
+        motion: Motion model that predicts the next state.
+        state: Newest state.
+        stamp_ns: Stamp of the newest state [ns]; None before the map began.
         inertial: Whether the map is metric and gravity-aligned and the velocity known, so
             that the accelerometer counts.
         metric: Whether the map's unit is the metre.

@@ -32,13 +32,13 @@ REUSE_SEARCH_PX = 15.0
 
 @dataclass(frozen=True, eq=False)
 class NewKeyframe:
-    """What the engine knows of an image that becomes a keyframe.
+    """An image that becomes a keyframe.
 
     Attributes:
-        stamp_ns: Of the image.
-        image: (height, width) grey.
-        depth: (height, width) [m]; None without a depth camera.
-        state: Of the rig, as tracked.
+        stamp_ns: Stamp of the image [ns].
+        image: (height, width) grey image.
+        depth: (height, width) depth [m]; None without a depth camera.
+        state: Tracked state of the rig.
         motion: Inertial motion since the last keyframe, where known.
         still: Whether the robot is at rest.
     """
@@ -55,11 +55,11 @@ class LocalMapper:
     """Extends the map by one keyframe at a time.
 
     Args:
-        sparse_map, tracker: Changed in place.
-        adjuster: Of the same map.
+        sparse_map, tracker: Map and followed corners, changed in place.
+        adjuster: Bundle adjustment of the map.
         camera, T_rig_camera: The robot's camera.
         parameters: The robot's section of the configuration.
-        max_depth_m: Depth beyond this starts no point.
+        max_depth_m: Largest depth that starts a point [m].
 
     Attributes:
         found_old: Whether the newest keyframe found points again of keyframes older than the
@@ -89,7 +89,7 @@ class LocalMapper:
         """Add a keyframe; returns the covariance of its pose where it is known.
 
         Args:
-            new: The keyframe; the tracker stands at its image.
+            new: The keyframe, whose image is the tracker's newest.
             inertial: Whether the map is metric and gravity-aligned.
         """
         keyframe = self._append(new)

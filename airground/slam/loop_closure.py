@@ -44,11 +44,11 @@ class LoopCloser:
     """Recognizes old places and straightens the map by them.
 
     Args:
-        sparse_map, tracker: Changed in place.
-        adjuster, recovery: Of the same map.
+        sparse_map, tracker: Map and followed corners, changed in place.
+        adjuster, recovery: Bundle adjustment and relocalization in the map.
         camera, T_rig_camera: The robot's camera.
         parameters: The robot's section of the configuration.
-        max_depth_m: Depth beyond this is not used.
+        max_depth_m: Largest depth to use [m].
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class LoopCloser:
         """Look whether the newest keyframe shows an old place; if so, correct the whole map.
 
         Args:
-            depth: (height, width) of the newest keyframe [m]; None without a depth camera.
+            depth: (height, width) depth of the newest keyframe [m]; None without a depth camera.
             inertial: Whether the map is metric and gravity-aligned by the accelerometer.
 
         Returns:

@@ -49,14 +49,14 @@ class MapAdjuster:
     """Bundle adjustment over a sparse map.
 
     Args:
-        sparse_map: Changed in place.
-        camera: Of all keyframes.
-        T_rig_camera: The camera in the rig.
-        parameters: Size of the window, noise of a corner.
-        inverse_depth_sigma: Noise of measured inverse depth [1/m].
+        sparse_map: Map, changed in place.
+        camera: Camera of all keyframes.
+        T_rig_camera: Pose of the camera in the rig.
+        parameters: The robot's section of the configuration.
+        inverse_depth_sigma: Standard deviation of measured inverse depth [1/m].
 
     Attributes:
-        motions: By keyframe, the inertial motion since the one before, where known.
+        motions: Inertial motion before each keyframe, by its index, where known.
         settled_ns: Keyframes up to this stamp took part in adjusting the whole map long after
             they were made, and hold what their inertial motions had to tell.
     """
@@ -129,7 +129,7 @@ class MapAdjuster:
         return due
 
     def can_skip(self, keyframe: int) -> bool:
-        """Whether a keyframe may go without a loss of what inertia tells."""
+        """Whether a keyframe may go without a loss of inertial information."""
         if self._map.keyframes[keyframe + 1].stamp_ns <= self.settled_ns:
             return True
         before, after = self.motions.get(keyframe), self.motions.get(keyframe + 1)

@@ -1,4 +1,4 @@
-"""The map as it was, to return to when a correction proves wrong."""
+"""A copy of the map, to restore when a correction proves wrong."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ class MapSnapshot:
     """What adjustment changes of a map.
 
     Attributes:
-        states: Of the keyframes.
+        states: States of the keyframes.
         sightings: `ids`, `pixels` and `inverse_depths` of the keyframes, which are replaced
             and never written to.
-        positions, point_states: Of the points.
+        positions, point_states: Positions and states of the points.
     """
 
     states: list[RigState]

@@ -17,11 +17,11 @@ from airground.slam.starts import RestStart, TwoViewWait
 from airground.slam.tight_scale import TightScale
 
 MIN_TRACKED = 30
-"""Map points that must be seen before the first pose is given out."""
+"""Least number of map points in the image of the first published pose."""
 UNKNOWN_SCALE = ScaleEstimate(np.inf, observable=False)
-"""While there is no motion to judge by."""
+"""The estimate before any motion."""
 MAX_UNSEEN_S = 3.5
-"""A map that was begun but shows too few points for so long is begun anew."""
+"""Time without a pose after which a new map is started again [s]."""
 
 
 class MonocularSlam:
@@ -32,9 +32,9 @@ class MonocularSlam:
     an unknown scale, and poses are given out when the scale is known.
 
     Args:
-        calibration: What is known about the robot's sensors.
-        config: The whole pipeline's; the section `monocular_slam` is used.
-        rng: Draws samples wherever outliers are to be told.
+        calibration: Nominal calibration of the robot.
+        config: Configuration; its section `monocular_slam` is used.
+        rng: Source of the samples of outlier rejection.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class MonocularSlam:
         self._slam.motion.add(samples)
 
     def track(self, image: MavImage) -> TrackedPose:
-        """Where the camera was when `image` was taken."""
+        """The pose of the camera at `image`."""
         require_order(image.stamp_ns, self._last_ns)
         self._last_ns = image.stamp_ns
         frame = Frame(image.stamp_ns, image.image)
@@ -65,7 +65,7 @@ class MonocularSlam:
         fit, corrected = slam.track(frame)
         corrected |= self._scale.update(fit is not None)
         if not self._given_out:
-            # Nobody looks for a map in which no pose was given out: nothing leads back to it.
+            # A map without a published pose is not searched for: nothing leads back to it.
             if slam.unseen_s() > MAX_UNSEEN_S or slam.stranded():
                 self._give_up()
             if fit is None or fit.inliers.sum() < MIN_TRACKED or not self._scale.known:
@@ -91,12 +91,12 @@ class MonocularSlam:
             self._slam.adjust_all()
 
     def trajectory(self) -> Trajectory | None:
-        """Every image tracked so far, at the pose that is believed now."""
+        """The newest poses of all images tracked so far."""
         return self._slam.trajectory()
 
     def _begin(self, frame: Frame) -> None:
         """Begin the map if the robot just left its place, or two views allow it."""
-        # Even flight reads as rest, and what was not seen cannot tell: nobody rests in the air.
+        # Even flight reads as rest: after the first map the robot may be in the air.
         may_rest = self._tight and not self._left
         begin = self._rest.observe(frame, self._slam.motion) if may_rest else None
         if begin is not None:

@@ -21,7 +21,7 @@ MAX_COAST_S = 3.0
 """For this long a robot is believed to go on without a look at the scene. Inertial dead
 reckoning drifts by centimetres meanwhile; others may have stopped or turned off."""
 ROTATION_SIGMA = 2e-3
-"""What the gyro leaves open from image to image: clock, mounting and bias [rad]."""
+"""Standard deviation of the gyro's turn between images, by clock, mounting and bias [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class Prediction:
     """The state at the next image before looking at it.
 
     Attributes:
-        state: As predicted.
+        state: Predicted state.
         rotation_sigma: How well the rotation is known [rad]; None without a gyro.
         inertial: Whether position and velocity follow the accelerometer, too.
     """
@@ -43,8 +43,8 @@ class MotionModel:
     """Predicts by the IMU where there is one, else by constant velocity.
 
     Args:
-        imu: Noise of the robot's IMU; None without one.
-        time_offset_ns: Added to the camera's stamps gives the IMU's clock.
+        imu: Noise of the robot's IMU; None without an IMU.
+        time_offset_ns: Offset from the camera's clock to the IMU's [ns].
     """
 
     def __init__(self, imu: ImuNoise | None, time_offset_ns: int) -> None:
@@ -80,9 +80,9 @@ class MotionModel:
         """The state at `end_ns`.
 
         Args:
-            state: At `start_ns`.
-            turn: (3, 3) rotation over the image before, for want of a gyro.
-            start_ns, end_ns: Stamps of two images.
+            state: State at `start_ns`.
+            turn: (3, 3) rotation to the previous image, used without a gyro.
+            start_ns, end_ns: Stamps of two images [ns].
             metric: Whether the map's unit is the metre and its z axis points up.
         """
         seconds = (end_ns - start_ns) * 1e-9
@@ -111,10 +111,10 @@ class MotionModel:
 
         Args:
             before: The state at the image before.
-            prediction: From there.
-            T_map_rig: As measured.
-            seconds: Since the image before; None if that gave no pose, so that the way from
-                there tells no velocity.
+            prediction: Prediction from that state.
+            T_map_rig: Measured pose.
+            seconds: Time since the previous image [s]; None if it had no pose, so that the velocity
+                is unknown.
         """
         state = prediction.state.posed(T_map_rig)
         if prediction.inertial:
@@ -128,8 +128,8 @@ class MotionModel:
 
         Args:
             before: The state at the image before.
-            prediction: From there.
-            unseen_s: How long nothing was seen [s].
+            prediction: Prediction from that state.
+            unseen_s: Time since the last image with a pose [s].
         """
         state = prediction.state
         if unseen_s > MAX_COAST_S:
@@ -137,7 +137,7 @@ class MotionModel:
             return replace(before, rotation=turned.rotation, velocity=np.zeros(3))
         if prediction.inertial:
             return state
-        # The last turn repeats itself, and without this so would its rounding, doubled each time.
+        # The last turn is repeated; without this its rounding error would double each time.
         rotation = nearest_rotation(state.rotation)
         # What drives along a curve turns its velocity with it.
         velocity = rotation @ before.rotation.T @ before.velocity

@@ -1,4 +1,4 @@
-"""Where corners of one image lie in another (Lucas and Kanade, in pyramids)."""
+"""Corners of one image in another (Lucas and Kanade, in pyramids)."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import numpy as np
 from airground.core.arrays import F32, U8, Mask
 
 MAX_DIFFERENCE = 22.0
-"""Mean absolute difference of two patches that may still be the same [grey levels]."""
+"""Largest mean absolute difference of two patches of the same place [grey levels]."""
 MIN_BRIGHTNESS = 4.0
-"""A darker image shows nothing [grey levels]."""
+"""Least mean brightness of a usable image [grey levels]."""
 BORDER_PX = 4.0
 
 
@@ -20,10 +20,10 @@ def flow(
     """Follow corners from `image` to `other`.
 
     Args:
-        image, other: (height, width) grey; a difference in exposure is taken out first.
-        pixels: (N, 2) corners in `image`.
-        start: (N, 2) where to begin the search in `other`: good predictions need few levels.
-        window_px: Side of the patches.
+        image, other: (height, width) grey images; a difference in exposure is removed first.
+        pixels: (N, 2) pixels of the corners in `image`.
+        start: (N, 2) pixels in `other` at which the search begins.
+        window_px: Side of the patches [px].
         levels: Pyramid levels above the full resolution.
 
     Returns:

@@ -1,4 +1,4 @@
-"""Spreading what a loop did not close over the keyframes that led around it."""
+"""Distributing the error of a loop over its keyframes."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ times smaller than those of an edge with as many points."""
 
 @dataclass(frozen=True, eq=False)
 class Edge:
-    """Where one keyframe is as seen from another.
+    """The relative pose of two keyframes.
 
     Attributes:
         first, second: Indices of the keyframes.
-        T_first_second: The second in the first.
-        points: How many points say so.
+        T_first_second: Pose of the second in the first.
+        points: Number of shared points, the weight of the edge.
     """
 
     first: int
@@ -46,8 +46,8 @@ def straighten(sparse_map: SparseMap, loop: Edge) -> None:
     they can: the better, the more points they share. The first keyframe stays.
 
     Args:
-        sparse_map: Changed in place; velocities turn with their keyframes.
-        loop: The new measurement.
+        sparse_map: Map, changed in place; velocities turn with their keyframes.
+        loop: Measured relative pose that closes the loop.
     """
     before = [keyframe.state.pose() for keyframe in sparse_map.keyframes]
     certain = Edge(loop.first, loop.second, loop.T_first_second, loop.points * LOOP_CERTAINTY**2)

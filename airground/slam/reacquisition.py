@@ -43,14 +43,14 @@ def keyframes_in_view(
     """The keyframes with a similar view that saw most of the points.
 
     Args:
-        sparse_map: With keyframes and points.
+        sparse_map: Map with keyframes and points.
         candidates: Keyframes to choose from.
-        T_map_camera: The view.
-        T_rig_camera: The camera in the rig.
+        T_map_camera: Pose of the view.
+        T_rig_camera: Pose of the camera in the rig.
         points_in_view: Numbers of the points that the view should see.
-        count: At most this many.
-        least: Each must have seen at least this many of the points.
-        max_turn_deg: Views that are turned by more are not similar.
+        count: Most keyframes to return.
+        least: Least number of the points that a keyframe must have seen.
+        max_turn_deg: Largest turn between similar views [deg].
     """
     seen = sparse_map.shared(points_in_view)
     shared = np.zeros_like(seen)
@@ -85,12 +85,12 @@ def find_again(
     """Follow points from an old keyframe into an image.
 
     Args:
-        sparse_map: With the keyframe.
-        keyframe: Which one.
-        ids: (n,) points it saw, sorted.
-        image: (height, width) grey.
-        start: (n, 2) where the points are expected in `image`.
-        window_px, levels: As in `optical_flow.flow`.
+        sparse_map: Map with the keyframe.
+        keyframe: Index of the old keyframe.
+        ids: (n,) numbers of points that it saw, sorted.
+        image: (height, width) grey image.
+        start: (n, 2) expected pixels of the points in `image`.
+        window_px, levels: Patch size and pyramid levels as in `optical_flow.flow`.
 
     Returns:
         Numbers of the points that were found, and (m, 2) pixels in `image`.
@@ -119,12 +119,12 @@ def find_in_keyframes(
 
     Args:
         sparse_map: With the keyframes.
-        keyframes: Which ones, the most similar view first.
-        ids: (n,) points, sorted.
-        image: (height, width) grey.
-        expected: (n, 2) where the points are expected in `image`.
-        window_px, levels: As in `optical_flow.flow`.
-        search_px: A point found farther than this from where it was expected is another.
+        keyframes: Indices of the keyframes, the most similar view first.
+        ids: (n,) numbers of the points, sorted.
+        image: (height, width) grey image.
+        expected: (n, 2) expected pixels of the points in `image`.
+        window_px, levels: Patch size and pyramid levels as in `optical_flow.flow`.
+        search_px: Largest distance of a point from its expected pixel [px].
 
     Returns:
         Numbers of the points that were found, and (m, 2) pixels in `image`.

@@ -17,11 +17,11 @@ from airground.slam.reacquisition import find_in_keyframes, keyframes_in_view, v
 from airground.slam.sparse_map import SparseMap
 
 MIN_FOUND = 20
-"""Map points that must agree before a robot believes to be back."""
+"""Least number of agreeing map points for a relocalization."""
 MIN_FOUND_TURN_KNOWN = 12
-"""The same where a gyro tells how the camera is turned: fewer agree by chance."""
+"""Least number of agreeing points where a gyro gives the rotation: fewer agree by chance."""
 TURN_SIGMA = 0.02
-"""What a gyro leaves open while nothing is seen [rad]."""
+"""Standard deviation of the gyro's rotation while nothing is seen [rad]."""
 LEVELS = 3
 KEYFRAMES = 3
 MAX_TURN_DEG = 40.0
@@ -34,9 +34,9 @@ class Found:
     """The map, found again.
 
     Attributes:
-        ids: (n,) points seen.
-        pixels: (n, 2) where.
-        fit: The camera's pose by them.
+        ids: (n,) numbers of the points seen.
+        pixels: (n, 2) pixels of the points.
+        fit: Pose of the camera by these points.
     """
 
     ids: I64
@@ -48,9 +48,9 @@ class Recovery:
     """Finds the pose of an image without that of the image before.
 
     Args:
-        sparse_map: Where to look.
+        sparse_map: Map to relocalize in.
         camera, T_rig_camera: The robot's camera.
-        parameters: Noise and patches.
+        parameters: The robot's section of the configuration.
     """
 
     def __init__(
@@ -86,9 +86,9 @@ class Recovery:
         """Look where the map should be if the camera is about there.
 
         Args:
-            image: (height, width) grey.
-            T_map_camera: About where it was taken.
-            turn_known: Whether a gyro says how the camera is turned.
+            image: (height, width) grey image.
+            T_map_camera: Approximate pose of the camera.
+            turn_known: Whether the rotation is known from a gyro.
             among: Keyframes to look for; all by default.
             without: Numbers of points not to look for.
         """

@@ -15,10 +15,10 @@ from airground.slam.pose_covariance import DEPTH_SCALE_SIGMA, LEVEL_SIGMA
 from airground.slam.starts import StandStill, level_start
 
 HAND_HELD = 1.5
-"""A depth camera without an IMU is in somebody's hand: it turns while its rows are read one after
-the other, and corners are this many times less certain."""
+"""Factor on the corners' standard deviation without an IMU: the camera is then hand-held, and turns
+while its rows are read out."""
 MIN_FIRST_POINTS = 40
-"""A map begins with an image that shows at least this many corners with depth."""
+"""Least number of corners with depth in a map's first image."""
 
 
 class RgbdSlam:
@@ -28,9 +28,9 @@ class RgbdSlam:
     shows something, also while the camera only turns.
 
     Args:
-        calibration: What is known about the robot's sensors.
-        config: The whole pipeline's; the section `rgbd_slam` is used.
-        rng: Draws samples wherever outliers are to be told.
+        calibration: Nominal calibration of the robot.
+        config: Configuration; its section `rgbd_slam` is used.
+        rng: Source of the samples of outlier rejection.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class RgbdSlam:
         self._slam.motion.add(samples)
 
     def track(self, image: GroundImage) -> TrackedPose:
-        """Where the camera was when `image` was taken."""
+        """The pose of the camera at `image`."""
         require_order(image.stamp_ns, self._last_ns)
         self._last_ns = image.stamp_ns
         grey = cv2.cvtColor(image.colour, cv2.COLOR_RGB2GRAY).astype(np.uint8, copy=False)
@@ -85,7 +85,7 @@ class RgbdSlam:
             self._slam.adjust_all()
 
     def trajectory(self) -> Trajectory | None:
-        """Every image tracked so far, at the pose that is believed now."""
+        """The newest poses of all images tracked so far."""
         return self._slam.trajectory()
 
     def _begin(self, frame: Frame) -> TrackedPose:

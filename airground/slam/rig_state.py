@@ -1,4 +1,4 @@
-"""What is estimated of a moving robot."""
+"""The estimated state of a moving robot."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from airground.slam.inertial.stationarity import Rest
 
 @dataclass(frozen=True, eq=False)
 class RigState:
-    """The rig is the IMU; where there is none, the camera.
+    """State of the rig: the IMU, or the camera where there is no IMU.
 
     Attributes:
-        rotation, position: `T_map_rig` [m].
-        velocity: (3,) in the map [m/s].
-        gyro_bias, accelerometer_bias: (3,) [rad/s], [m/s^2].
+        rotation, position: (3, 3) and (3,) pose `T_map_rig` [m].
+        velocity: (3,) velocity in the map [m/s].
+        gyro_bias, accelerometer_bias: (3,) biases [rad/s], [m/s^2].
     """
 
     rotation: F64
@@ -59,9 +59,9 @@ class RigState:
         """The same state after the map was scaled and then turned about its origin.
 
         Args:
-            scale: Of all distances but that between rig and camera, which is known in metres.
-            rotation: (3, 3) after scaling.
-            lever: (3,) place of the camera in the rig.
+            scale: Factor on all distances but that between rig and camera, which is metric.
+            rotation: (3, 3) rotation after scaling.
+            lever: (3,) position of the camera in the rig [m].
         """
         turned = nearest_rotation(rotation @ self.rotation)
         camera = scale * rotation @ (self.position + self.rotation @ lever)

@@ -24,15 +24,15 @@ class Keyframe:
     """One image that stays, its state, and what it saw.
 
     Attributes:
-        stamp_ns: Of the image.
-        image: (height, width) uint8 grey.
-        state: Of the rig.
-        ids: (n,) int64 points seen, each once.
-        pixels: (n, 2) float64 where.
-        inverse_depths: (n,) [1/m], measured by a depth camera; NaN where it was not.
+        stamp_ns: Stamp of the image [ns].
+        image: (height, width) uint8 grey image.
+        state: State of the rig.
+        ids: (n,) int64 numbers of the points seen, each once.
+        pixels: (n, 2) float64 pixels of the points.
+        inverse_depths: (n,) measured inverse depths [1/m]; NaN without one.
         still: Whether the robot was at rest.
-        held: Whether a neighbour was culled with its inertial motion. What that told of scale
-            and vertical is in the poses by then, and adjusting the whole map must not lose it.
+        held: Whether a neighbour was culled with its inertial motion. The poses then contain its
+            information on scale and vertical, which adjusting the whole map must not lose.
     """
 
     stamp_ns: int
@@ -61,12 +61,12 @@ class SparseMap:
     """Keyframes in order of time, and points by their number.
 
     Attributes:
-        keyframes: All that were not culled.
-        culled: How many were.
-        positions: (capacity, 3) of the points in the map [m]; only those MAPPED count.
-        states: (capacity,) CANDIDATE, MAPPED or DROPPED.
-        origins: (capacity,) index of the keyframe in which a point was first seen ...
-        first_pixels: (capacity, 2) ... and where in its image.
+        keyframes: Keyframes that were not culled.
+        culled: Number of culled keyframes.
+        positions: (capacity, 3) positions of the points [m]; only those MAPPED count.
+        states: (capacity,) state of each point: CANDIDATE, MAPPED or DROPPED.
+        origins: (capacity,) index of the keyframe that first saw each point.
+        first_pixels: (capacity, 2) pixel of each point in that keyframe.
     """
 
     def __init__(self) -> None:
@@ -163,9 +163,9 @@ class SparseMap:
         """Nearest and farthest of the points in a view, along its optical axis [m].
 
         Args:
-            ids: Points seen; only those in the map count.
-            T_map_camera: The view.
-            least: With fewer of them there is no range.
+            ids: Numbers of the points seen; only those in the map count.
+            T_map_camera: Pose of the view.
+            least: Least number of points for a range.
         """
         ids = ids[self.mapped(ids)]
         if len(ids) < least:

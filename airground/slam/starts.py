@@ -1,4 +1,4 @@
-"""How a map begins: level, at rest, or with two views from a robot in motion."""
+"""The start of a map: level, at rest, or with two views from a robot in motion."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class StandStill:
     """Notices that a tracked robot stands still, so that its velocity and its biases are known.
 
     Args:
-        calibration: Of the robot.
+        calibration: Nominal calibration of the robot.
     """
 
     def __init__(self, calibration: RobotCalibration) -> None:
@@ -88,7 +88,7 @@ class RestStart:
     """Waits beside a robot at rest until it begins to move.
 
     Args:
-        calibration: Of the robot.
+        calibration: Nominal calibration of the robot.
     """
 
     def __init__(self, calibration: RobotCalibration) -> None:
@@ -121,9 +121,9 @@ class MovingStart:
 
     Attributes:
         first, second: The images.
-        first_state, second_state: Of the rig; the map's unit is the first's median depth.
-        pixels_first, pixels_second: (n, 2) of the points.
-        points_map: (n, 3).
+        first_state, second_state: States of the rig, in units of the first view's median depth.
+        pixels_first, pixels_second: (n, 2) pixels of the points.
+        points_map: (n, 3) points in the map.
     """
 
     first: Frame
@@ -139,9 +139,9 @@ class TwoViewWait:
     """Follows corners from one image until another sees enough of them from elsewhere.
 
     Args:
-        calibration: Of the robot.
-        parameters: Of its SLAM.
-        rng: Draws samples of the matches.
+        calibration: Nominal calibration of the robot.
+        parameters: The robot's section of the configuration.
+        rng: Source of the samples of matches.
     """
 
     def __init__(

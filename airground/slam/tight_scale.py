@@ -11,18 +11,18 @@ from airground.slam.keyframe_slam import KeyframeSlam
 
 MIN_KEYFRAMES = 6
 MIN_SECONDS = 1.5
-"""Less is no motion to measure a scale by."""
+"""Least duration of a motion that shows the scale [s]."""
 MAX_KEYFRAMES = 60
-"""A scale is searched over this many of the newest keyframes."""
+"""Number of newest keyframes that a scale is searched over."""
 GIVE_OUT_SIGMA = 0.02
 """Poses are given out when the scale is known this well [share] ..."""
 GIVE_OUT_TILT = np.deg2rad(0.5)
 """... and the vertical this well [rad] ..."""
 TILT_PATIENCE_S, PATIENT_TILT = 6.0, np.deg2rad(0.7)
-"""... or after so long [s] this well: flying without turning, nobody can tell tilt from the bias
-of an accelerometer."""
+"""... or, after so long [s], this well [rad]: in flight without turning, tilt cannot be separated
+from the bias of the accelerometer."""
 UNKNOWN_TILT = np.deg2rad(5.0)
-"""What one look at the accelerometer tells of the vertical [rad]."""
+"""Standard deviation of the vertical by one reading of the accelerometer [rad]."""
 POSE_SIGMA_PX = 0.3
 """Noise of a keyframe's place, as its points would see it [px]."""
 
@@ -34,17 +34,17 @@ class TightScale:
     its scale. One that began in motion is scaled and turned upright once both are known.
 
     Args:
-        slam: Whose map; changed in place.
+        slam: SLAM with the map, changed in place.
 
     Attributes:
-        estimate: How well the scale is known; None before there was anything to judge by.
+        estimate: How well the scale is known; None before the first alignment.
         known: Whether poses may be given out.
         tilt_sigma: How well the vertical is known, per axis [rad].
     """
 
     def __init__(self, slam: KeyframeSlam) -> None:
         self.estimate: ScaleEstimate | None = None
-        # Without an IMU nobody will ever know: the unit is the scene's median depth.
+        # Without an IMU the scale stays unknown: the unit is the scene's median depth.
         self.known = slam.calibration.imu is None
         self.tilt_sigma = UNKNOWN_TILT
         self._slam = slam

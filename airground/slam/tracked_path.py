@@ -1,4 +1,4 @@
-"""Where the camera was when each image was taken, hung on keyframes that may still move."""
+"""The camera's pose at each image, relative to keyframes that may still move."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ FIRST_IMAGES = 1024
 
 
 class TrackedPath:
-    """Every image whose pose was given out, in order of time.
+    """Every image with a published pose, in order of time.
 
-    Keyframes are known by their stamps. One that is culled hands its images on to another.
+    Keyframes are known by their stamps. The images of a culled one go to another.
     """
 
     def __init__(self) -> None:

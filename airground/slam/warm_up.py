@@ -1,4 +1,4 @@
-"""Compiles what SLAM needs before the first image is waiting for it."""
+"""Compiles the kernels of SLAM before the first image arrives."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def warm_up_slam(rng: np.random.Generator) -> None:
     The MAV begins once at rest and once in motion.
 
     Args:
-        rng: Draws the texture and the samples.
+        rng: Source of the texture and the samples.
     """
     texture = _texture(rng)
     noise = ImuNoise(1e-4, 1e-5, 1e-3, 1e-4)

@@ -102,12 +102,6 @@ def driven_path(world: World) -> GroundPath:
     return ground.model_copy(update={"waypoints": kept})
 
 
-def measured_overlap(scene: Scene, seeds: tuple[int, ...] = (0, 1, 2)) -> float:
-    """Median of `overlap_along_flight` over some seeds."""
-    worlds = [build_world(scene, seed, pictures=False) for seed in seeds]
-    return float(np.median(np.concatenate([overlap_along_flight(world) for world in worlds])))
-
-
 def _flight(scene: Scene) -> tuple[NDArray, NDArray]:
     """Times (K,) [s] and places (K, 2) [m] every 0.7 m of flight at full height."""
     mav = scene.mav

@@ -104,28 +104,6 @@ class ImageSensor:
         return np.asarray(cv2.merge(list(exposed)), np.uint8).reshape(sharp.shape)
 
 
-def pixel_motion(
-    depth: NDArray[np.float32], camera: PinholeCamera, T_start_end: SE3
-) -> NDArray[np.float32]:
-    """(height, width, 2) how far each pixel's scene point moves in the image [px].
-
-    First order in the motion: with the camera's twist (v, w), a point X moves by
-    -v - w x X, and its pixel accordingly.
-
-    Args:
-        depth: (height, width) [m]; NaN counts as infinitely far.
-        camera: Intrinsics.
-        T_start_end: The camera's motion.
-    """
-    depth, x_rays, y_rays, focal_px, twist = _motion_terms(depth, camera, T_start_end)
-    motion = np.empty((*depth.shape, 2), np.float32)
-    for row in range(len(depth)):
-        _row_motion(
-            depth[row], x_rays, y_rays[row], focal_px, twist, motion[row, :, 0], motion[row, :, 1]
-        )
-    return motion
-
-
 def _motion_terms(
     depth: NDArray[np.float32], camera: PinholeCamera, T_start_end: SE3
 ) -> tuple[NDArray[np.float32], NDArray, NDArray, NDArray[np.float32], NDArray[np.float32]]:

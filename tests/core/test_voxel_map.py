@@ -8,31 +8,24 @@ import pytest
 from airground.core.voxel_map import VoxelMap
 
 
-def naive(points: np.ndarray, weights: np.ndarray, voxel_m: float) -> dict:
+def naive(points: np.ndarray, voxel_m: float) -> dict:
     cells = defaultdict(list)
-    for point, weight in zip(points, weights, strict=True):
-        cells[tuple(int(np.floor(c / voxel_m)) for c in point)].append((point, weight))
-    return {
-        cell: sum(p * w for p, w in members) / sum(w for _, w in members)
-        for cell, members in cells.items()
-    }
+    for point in points:
+        cells[tuple(int(np.floor(c / voxel_m)) for c in point)].append(point)
+    return {cell: sum(members) / len(members) for cell, members in cells.items()}
 
 
-def random_points(n: int = 500) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def random_points(n: int = 500) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(1)
-    return (
-        rng.normal(0, 0.2, (n, 3)),
-        rng.integers(0, 256, (n, 3), dtype=np.uint8),
-        rng.uniform(0.1, 2, n),
-    )
+    return rng.normal(0, 0.2, (n, 3)), rng.integers(0, 256, (n, 3), dtype=np.uint8)
 
 
-def test_weighted_means_match_the_slow_twin() -> None:
-    points, colours, weights = random_points()
+def test_means_match_the_slow_twin() -> None:
+    points, colours = random_points()
     fast = VoxelMap(0.1)
     for part in np.array_split(np.arange(len(points)), 7):
-        fast.add(points[part], colours[part], weights[part])
-    slow = naive(points, weights, 0.1)
+        fast.add(points[part], colours[part])
+    slow = naive(points, 0.1)
     expected = np.array(sorted(map(tuple, slow.values())))
     got = np.array(sorted(map(tuple, fast.cloud().points.astype(float))))
     assert len(fast) == len(slow)
@@ -40,19 +33,12 @@ def test_weighted_means_match_the_slow_twin() -> None:
 
 
 def test_order_of_arrival_does_not_matter() -> None:
-    points, colours, weights = random_points()
+    points, colours = random_points()
     one, two = VoxelMap(0.1), VoxelMap(0.1)
-    one.add(points, colours, weights)
+    one.add(points, colours)
     for part in reversed(np.array_split(np.arange(len(points)), 5)):
-        two.add(points[part], colours[part], weights[part])
+        two.add(points[part], colours[part])
     assert np.allclose(one.cloud().points, two.cloud().points, atol=1e-6)
-
-
-def test_thin_cubes_are_dropped_on_request() -> None:
-    voxels = VoxelMap(1.0)
-    voxels.add(np.array([[0.5, 0.5, 0.5]] * 3 + [[2.5, 0.5, 0.5]]), np.zeros((4, 3), np.uint8))
-    assert len(voxels.cloud(min_count=1)) == 2
-    assert len(voxels.cloud(min_count=2)) == 1
 
 
 def test_empty_input_and_far_points() -> None:

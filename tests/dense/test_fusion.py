@@ -10,8 +10,13 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from airground.dense import fusion
-from airground.dense.distance_field import bin_centres
 from airground.dense.fusion import Fusion, prox
+
+
+def bin_centres(bins: int) -> NDArray[np.float64]:
+    """(bins,) values c_j of the bins, evenly spaced in [-1, 1]."""
+    return (2 * np.arange(bins) + 1) / bins - 1.0
+
 
 CENTRES = bin_centres(8)
 

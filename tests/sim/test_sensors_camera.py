@@ -5,7 +5,13 @@ import pytest
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from sim.sensors.camera import MAX_SAMPLES, ExposureDrift, ImageSensor, pixel_motion
+from sim.sensors.camera import (
+    MAX_SAMPLES,
+    ExposureDrift,
+    ImageSensor,
+    _motion_terms,
+    _row_motion,
+)
 from sim.sensors.hashed_noise import gaussian, noise_key
 from sim.sensors.presets import HARSH, NOMINAL, ImageNoise
 
@@ -16,6 +22,17 @@ FAULTLESS = ImageNoise(0.0, 0.0, 0.0, 0.0, 0.01)
 
 def rng() -> np.random.Generator:
     return np.random.default_rng(5)
+
+
+def pixel_motion(depth: np.ndarray, camera: PinholeCamera, T_start_end: SE3) -> np.ndarray:
+    """(height, width, 2) motion of each pixel's scene point in the image [px], row by row."""
+    depth, x_rays, y_rays, focal_px, twist = _motion_terms(depth, camera, T_start_end)
+    motion = np.empty((*depth.shape, 2), np.float32)
+    for row in range(len(depth)):
+        _row_motion(
+            depth[row], x_rays, y_rays[row], focal_px, twist, motion[row, :, 0], motion[row, :, 1]
+        )
+    return motion
 
 
 def test_pixel_motion_is_that_of_projected_points() -> None:

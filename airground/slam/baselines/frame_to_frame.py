@@ -1,6 +1,6 @@
-"""RGB-D odometry from each frame to the one before, whoever aligns the two.
+"""RGB-D odometry from each frame to the one before, with any aligner.
 
-No map, no keyframes, no correction: errors add up. What SLAM gains is the difference.
+Without map, keyframes and correction, errors add up; SLAM's gain is measured against this.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from airground.slam.front_end import TrackedPose, Tracking
 MIN_DEPTH_SHARE = 0.05
 """A frame with depth in fewer of its pixels cannot be aligned."""
 MIN_CONTRAST = 3.0
-"""Nor can one whose grey levels deviate less than this: the lens is covered, or it is dark."""
+"""Standard deviation of grey levels below which a frame is dark or the lens is covered."""
 MAX_SPEED_MPS = 3.0
 MAX_TURN_DPS = 360.0
 """No robot here moves faster; an alignment that says so has failed."""
@@ -31,7 +31,7 @@ class Aligner(Protocol):
     """Finds how the camera moved between two frames."""
 
     def align(self, previous: GroundImage, image: GroundImage) -> SE3 | None:
-        """`T_previous_image`, or None where it cannot be told."""
+        """`T_previous_image`, or None where the frames cannot be aligned."""
 
 
 class FrameToFrame:
@@ -41,8 +41,8 @@ class FrameToFrame:
     not, for up to a second; after that it stays lost, since it has no map to return to.
 
     Args:
-        calibration: Of the robot.
-        aligner: Who aligns two frames.
+        calibration: Nominal calibration of the robot.
+        aligner: Aligner of two frames.
     """
 
     def __init__(self, calibration: RobotCalibration, aligner: Aligner) -> None:
@@ -52,7 +52,7 @@ class FrameToFrame:
         self._log = PoseLog()
 
     def add_imu(self, samples: ImuSamples) -> None:
-        """Only what comes before the first pose is of use: it tells what is up."""
+        """Use the samples before the first pose to find the direction of gravity."""
         if self._previous is None:
             self._start.add_imu(samples)
 

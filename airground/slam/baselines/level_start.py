@@ -1,4 +1,4 @@
-"""Where a map starts whose front end has no gravity of its own: at the first camera, level."""
+"""The start of a map for front ends that do not estimate gravity: level, at the first camera."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from airground.core.se3 import SE3, nearest_rotation
 
 GRAVITY_MPS2 = 9.81
 REST_TOLERANCE_MPS2 = 0.5
-"""An accelerometer that reads within this of gravity tells what is up."""
+"""Largest difference from gravity at which an accelerometer gives its direction [m/s^2]."""
 
 
 class LevelStart:
@@ -19,7 +19,7 @@ class LevelStart:
     to be level, and the calibration says how the camera sits in it.
 
     Args:
-        calibration: Of the robot.
+        calibration: Nominal calibration of the robot.
     """
 
     def __init__(self, calibration: RobotCalibration) -> None:

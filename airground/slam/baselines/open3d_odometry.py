@@ -27,7 +27,7 @@ class _Hybrid:
     """Aligns two frames with `open3d.t.pipelines.odometry.rgbd_odometry_multi_scale`."""
 
     def __init__(self, calibration: RobotCalibration) -> None:
-        # Open3D takes a second to import; who does not use it need not wait.
+        # Open3D takes a second to import: only where it is used.
         import open3d
 
         # Its type stubs know none of the ways in which it is called.

@@ -1,4 +1,4 @@
-"""Poses of any external system, from a TUM file that somebody has read."""
+"""Poses of an external system, from a trajectory that was read from a TUM file."""
 
 from __future__ import annotations
 

@@ -21,10 +21,10 @@ def eliminate_chain(
 
     Args:
         chain: (F, 9, 9) blocks on the diagonal.
-        links: (F, 9, 9) from block k to block k + 1; the last is not read.
-        coupling: (F, 9, 18) to the poses k - 1, k and k + 1.
-        gradient: (F, 9).
-        poses: (6 F, 6 F), its upper triangle is reduced.
+        links: (F, 9, 9) blocks between k and k + 1; the last is not read.
+        coupling: (F, 9, 18) blocks with the poses k - 1, k and k + 1.
+        gradient: (F, 9) gradient of velocities and biases.
+        poses: (6 F, 6 F) matrix of the poses, whose upper triangle is reduced.
         toward: (6 F,) gradient of the poses, reduced.
 
     Returns:
@@ -67,11 +67,11 @@ def eliminate_chain(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _columns(k: int, count: int) -> tuple[int, int]:
-    """Where the poses k - 1 to k + 1 stand."""
+    """Columns of the poses k - 1 to k + 1."""
     return max(0, 6 * k - 6), min(6 * count, 6 * k + 12)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def place(slot: int, moving: int, n: int) -> int:
-    """Where number n of a keyframe's 15 stands among the unknowns."""
+    """Index of number n of a keyframe's 15 among the unknowns."""
     return 6 * slot + n if n < 6 else 6 * moving + 9 * slot + n - 6

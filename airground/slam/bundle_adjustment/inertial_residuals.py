@@ -31,13 +31,13 @@ class PackedMotions:
     """All inertial factors, one array for each quantity.
 
     Attributes:
-        firsts: (F,) keyframe each motion starts from; it ends in the next.
-        durations: (F,) [s].
-        rotations: (F, 3, 3).
-        velocities, positions: (F, 3).
-        biases: (F, 6) gyro and accelerometer, where it was linearized.
-        by_biases: (F, 9, 6) change of rotation, velocity and position with them.
-        whitening: (F, 15, 15) turns a residual into one of unit covariance.
+        firsts: (F,) keyframe in which each motion starts; it ends in the next.
+        durations: (F,) durations of the motions [s].
+        rotations: (F, 3, 3) rotations of the motions.
+        velocities, positions: (F, 3) changes of velocity [m/s] and position [m].
+        biases: (F, 6) biases of gyro and accelerometer at the linearization.
+        by_biases: (F, 9, 6) derivatives of rotation, velocity and position by the biases.
+        whitening: (F, 15, 15) matrices that turn a residual into one of unit covariance.
     """
 
     firsts: I64
@@ -96,10 +96,10 @@ def motion_residual(
     """(15,) residual of one motion: rotation, velocity, position, walk of the biases.
 
     Args:
-        first, second: (12,) position, velocity, gyro bias, accelerometer bias.
-        R_first, R_second: (3, 3).
+        first, second: (12,) position, velocity, gyro bias and accelerometer bias of two keyframes.
+        R_first, R_second: (3, 3) rotations of the keyframes.
         motion: Duration, rotation, velocity, position, biases and their Jacobians.
-        jacobian: (15, 30) by both 15-vectors, overwritten.
+        jacobian: (15, 30) derivative by both keyframes' 15 unknowns, overwritten.
     """
     seconds, rotation, velocity, position, biases, by_biases = motion
     correction = by_biases @ (first[6:12] - biases)
@@ -154,11 +154,11 @@ def linearize_motions(
     """The cost of all motions; whitened `residuals` (F, 15) and `jacobians` (F, 15, 30).
 
     Args:
-        firsts, durations, rotations, velocities, positions, biases, by_biases, whitening: Of
-            `PackedMotions`.
-        R_map_rig: (K, 3, 3).
+        firsts, durations, rotations, velocities, positions, biases, by_biases, whitening: Fields
+            of `PackedMotions`.
+        R_map_rig: (K, 3, 3) rotations of the keyframes.
         vectors: (K, 12) position, velocity, gyro bias, accelerometer bias.
-        residuals, jacobians: Overwritten.
+        residuals, jacobians: Results, overwritten.
     """
     total = 0.0
     jacobian = np.empty((15, 30))

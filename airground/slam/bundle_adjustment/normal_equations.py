@@ -22,9 +22,9 @@ class Estimate:
     """The unknowns.
 
     Attributes:
-        rotations: (K, 3, 3).
+        rotations: (K, 3, 3) rotations of the keyframes.
         vectors: (K, 12) position, velocity, gyro bias, accelerometer bias.
-        points: (P, 3).
+        points: (P, 3) points in the map [m].
     """
 
     rotations: F64
@@ -38,9 +38,9 @@ class Linearization:
 
     Attributes:
         cost: Half the sum of squares, robust.
-        visual: (M, NUMBERS) of `residuals.linearize`.
-        motion_residuals, motion_jacobians: (F, 15), (F, 15, 30), whitened.
-        prior_residuals, headings: (K, ROWS), (K, 3), whitened.
+        visual: (M, NUMBERS) result of `residuals.linearize`.
+        motion_residuals, motion_jacobians: (F, 15) and (F, 15, 30) whitened inertial residuals.
+        prior_residuals, headings: (K, ROWS) and (K, 3) whitened residuals of the priors.
     """
 
     cost: float
@@ -53,18 +53,18 @@ class Linearization:
 
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
-    """Of the F moving keyframes, points eliminated.
+    """Normal equations of the F moving keyframes, points eliminated.
 
     Unknowns are the poses (rotation, position) of all keyframes and then, where there are
     inertial factors, velocity and biases of each. These couple in time only: `chain`.
 
     Attributes:
-        poses: (6 F, 6 F) of the Hessian, upper triangle.
+        poses: (6 F, 6 F) part of the Hessian, upper triangle.
         chain, links: (F, 9, 9) velocity and biases of a keyframe with themselves and with
             those of the next; F is 0 without inertial factors, here and below.
-        coupling: (F, 9, 18) with the poses of the keyframe before, the same, and the next.
-        gradient: (N,), N is 6 F or 15 F.
-        diagonal: (N,) of the Hessian before the points were eliminated.
+        coupling: (F, 9, 18) blocks with the poses of the previous, the same and the next keyframe.
+        gradient: (N,) gradient, N = 6 F or 15 F.
+        diagonal: (N,) diagonal of the Hessian before the points were eliminated.
     """
 
     poses: F64
@@ -79,14 +79,14 @@ class Model:
     """All that stays the same while the estimate moves.
 
     Args:
-        observations: Sorted.
+        observations: Sorted observations.
         motions: Inertial factors.
-        sharpness: (K, ROWS) of the priors.
-        slots: (K,) which moving keyframe each is, -1 for none.
-        camera: Pinhole.
-        T_rig_camera: Of the camera in the rig.
-        start: Where the gauge is held.
-        huber: Threshold.
+        sharpness: (K, ROWS) inverse standard deviations of the priors.
+        slots: (K,) number of each moving keyframe, -1 for the others.
+        camera: Camera of all keyframes.
+        T_rig_camera: Pose of the camera in the rig.
+        start: Estimate at which the gauge is held.
+        huber: Threshold of Huber's cost.
     """
 
     def __init__(
@@ -166,7 +166,7 @@ class Model:
         )
 
     def normal_equations(self, at: Linearization, damping: float) -> NormalEquations:
-        """With the points' blocks damped, the keyframes' not yet."""
+        """The normal equations, damped in the points' blocks only."""
         width, links = 6 * self.moving, self.moving if self.inertial else 0
         out = NormalEquations(
             np.zeros((width, width)),

@@ -11,7 +11,7 @@ from airground.slam.bundle_adjustment.chain import place
 from airground.slam.bundle_adjustment.problem import Role, Settings, States
 
 ROWS = 13
-"""Of a keyframe: position (3), heading, velocity (3), gyro bias (3), accelerometer bias (3)."""
+"""Priors of a keyframe: position (3), heading, velocity (3), gyro and accelerometer bias (3, 3)."""
 GAUGE_SIGMA = 1e-4
 """How tightly the gauge is held [m], [rad]: no observation competes with it, so that this is
 as good as exact, and still well within the range of double precision."""
@@ -21,10 +21,10 @@ def prior_sharpness(states: States, roles: I64, firsts: I64, settings: Settings)
     """(K, ROWS) one over the sigma of every prior; 0 where there is none.
 
     Args:
-        states: Says where the robot was still.
-        roles: (K,).
-        firsts: (F,) keyframe each inertial motion starts from.
-        settings: The sigmas.
+        states: Keyframes; `still` marks those at rest.
+        roles: (K,) role of each keyframe.
+        firsts: (F,) keyframe in which each inertial motion starts.
+        settings: Standard deviations of the priors.
     """
     sharpness = np.zeros((len(states), ROWS))
     sharpness[roles == Role.GAUGE, 0:4] = 1.0 / GAUGE_SIGMA
@@ -57,11 +57,11 @@ def linearize_priors(
     vector that leads from the keyframe at the start to the one now.
 
     Args:
-        sharpness: Of `prior_sharpness`.
-        start_rotations, start_vectors: Where the gauge is held.
-        rotations: (K, 3, 3).
+        sharpness: (K, ROWS) result of `prior_sharpness`.
+        start_rotations, start_vectors: Estimate at which the gauge is held.
+        rotations: (K, 3, 3) rotations of the keyframes.
         vectors: (K, 12) position, velocity, gyro bias, accelerometer bias.
-        residuals, headings: Overwritten.
+        residuals, headings: Results, overwritten.
     """
     total = 0.0
     for k in range(len(sharpness)):

@@ -13,7 +13,7 @@ from airground.slam.inertial.preintegration import Preintegration
 
 
 class Role(IntEnum):
-    """What may become of a keyframe."""
+    """The role of a keyframe in the adjustment."""
 
     FREE = 0
     FIXED = 1
@@ -29,7 +29,7 @@ class States:
         rotations, positions: (K, 3, 3) and (K, 3) `T_map_rig` [m].
         velocities: (K, 3) in the map [m/s].
         gyro_biases, accelerometer_biases: (K, 3) [rad/s], [m/s^2].
-        still: (K,) bool, where the robot was seen to be at rest; None for nowhere.
+        still: (K,) bool, whether the robot was at rest; None for no keyframe.
 
     Raises:
         ValueError: A shape is wrong or a number is not finite.
@@ -66,10 +66,10 @@ class Observations:
 
     Attributes:
         keyframes, points: (M,) int64, indices.
-        pixels: (M, 2) where the point was seen [px].
+        pixels: (M, 2) observed pixels [px].
         sigmas_px: (M,) standard deviation of each coordinate [px].
-        inverse_depths: (M,) measured, along the optical axis [1/m]; NaN where there is none.
-        inverse_depth_sigmas: (M,) [1/m]; not read where there is no inverse depth.
+        inverse_depths: (M,) measured inverse depths along the optical axis [1/m]; NaN without one.
+        inverse_depth_sigmas: (M,) standard deviations [1/m]; not read without an inverse depth.
 
     Raises:
         ValueError: A shape is wrong, a pixel is not finite, or a sigma is not positive.
@@ -107,7 +107,7 @@ class InertialFactor:
 
     Attributes:
         first, second: Indices of keyframes, second = first + 1.
-        preintegration: Between their times.
+        preintegration: Motion between the stamps of the two.
     """
 
     first: int
@@ -123,10 +123,10 @@ class Settings:
         iterations: Most steps tried: 8 for a window, 15 for a whole map.
         huber: Whitened residual from which a cost grows linearly.
         relative_decrease: A step that lowers the cost by a smaller share is the last one.
-        gyro_bias_prior_sigma: [rad/s] toward zero, on a keyframe that no inertial motion
-            leads to; None for no prior.
-        accelerometer_bias_prior_sigma: The same [m/s^2].
-        still_sigma: Of the velocity of a robot at rest [m/s].
+        gyro_bias_prior_sigma: Standard deviation of the bias about zero [rad/s], for a keyframe
+            that no inertial motion leads to; None for no prior.
+        accelerometer_bias_prior_sigma: Like `gyro_bias_prior_sigma`, of the accelerometer [m/s^2].
+        still_sigma: Standard deviation of the velocity of a robot at rest [m/s].
     """
 
     iterations: int = 8
@@ -142,13 +142,13 @@ class Adjustment:
     """What bundle adjustment found.
 
     Attributes:
-        states, points: The keyframes and (P, 3) points [m] at the optimum.
+        states, points: Keyframes and (P, 3) points [m] at the optimum.
         residuals_px: (M,) distance from where each point was seen to where it should have
             been [px]; NaN behind the camera.
         cost_before, cost_after: Half the sum of squared whitened residuals, linear beyond
             the Huber threshold.
         iterations: Steps tried.
-        covariance: (6, 6) of the pose of the last FREE keyframe: position [m], rotation
+        covariance: (6, 6) covariance of the last FREE keyframe's pose: position [m], rotation
             vector of estimate times inverse truth [rad], in the map's axes. None where there
             is no such keyframe or the problem does not determine it.
     """

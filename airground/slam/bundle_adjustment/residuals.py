@@ -17,12 +17,12 @@ from numba import njit
 from airground.core.arrays import F64, I64
 
 MIN_DEPTH = 1e-3
-"""Nearer than this [m] is behind the camera."""
+"""Least depth of a point before the camera [m]."""
 BEHIND_SIGMAS = 50.0
-"""What an observation behind the camera costs, as if it were off by so much. It does not pull,
-but it must not be a bargain either, or steps would turn points behind cameras."""
+"""Residual that is charged for a point behind the camera [standard deviations]. It has no
+gradient; a low cost would reward steps that turn points behind cameras."""
 NUMBERS = 12
-"""Of a linearized observation: B (xx, xy, xz, yy, yz, zz), A'Wr (3), d (3)."""
+"""Numbers of a linearized observation: B (xx, xy, xz, yy, yz, zz), A'Wr (3), d (3)."""
 FASTMATH = {"contract", "reassoc", "arcp", "nsz"}
 
 Triple = tuple[float, float, float]
@@ -110,15 +110,15 @@ def linearize(
     """The cost of all observations, and in `out` (M, NUMBERS) their linearization.
 
     Args:
-        keyframes, points_seen: (M,) int64.
+        keyframes, points_seen: (M,) int64 indices of each observation.
         measured: (M, 5) x and y [px], 1 / sigma [1/px], inverse depth [1/m] or NaN, 1 / sigma
             [m].
-        positions: (K, 3) of the rig [m].
-        R_camera_map, centres: Of `camera_poses`.
-        points: (P, 3) [m].
-        camera: fx, fy, cx, cy [px].
-        threshold: Huber's.
-        out: Overwritten.
+        positions: (K, 3) positions of the rig [m].
+        R_camera_map, centres: (K, 3, 3) and (K, 3) result of `camera_poses`.
+        points: (P, 3) points in the map [m].
+        camera: (4,) intrinsics fx, fy, cx, cy [px].
+        threshold: Threshold of Huber's cost.
+        out: (M, NUMBERS) result, overwritten.
     """
     fx, fy, cx, cy = camera[0], camera[1], camera[2], camera[3]
     behind, _ = huber(BEHIND_SIGMAS * BEHIND_SIGMAS, threshold)

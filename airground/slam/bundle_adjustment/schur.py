@@ -123,16 +123,16 @@ def eliminate_points(
     """Add what the observations say about the poses, their points eliminated.
 
     Args:
-        linear: (M, NUMBERS) of `residuals.linearize`, sorted by point and, within, by slot.
+        linear: (M, NUMBERS) result of `residuals.linearize`, sorted by point, then by slot.
         starts: (P + 1,) first observation of each point.
-        slots: (M,) which moving keyframe saw it; -1 for one that does not move.
+        slots: (M,) number of the moving keyframe; -1 for one that does not move.
         damping: Levenberg-Marquardt's, times the diagonal of each point's block.
-        hessian: (N, N), its upper triangle is added to; pose s begins at 6 s.
-        gradient, diagonal: (N,), added to; the latter as before elimination.
+        hessian: (N, N) matrix whose upper triangle is added to; pose s begins at 6 s.
+        gradient, diagonal: (N,) vectors, added to; the diagonal is that before elimination.
     """
     for j in range(len(starts) - 1):
         start, stop = starts[j], starts[j + 1]
-        # Wherever its one keyframe goes, the point can follow: it says nothing about poses.
+        # Seen once, a point can follow its keyframe anywhere: no information on poses.
         if stop - start < 2:
             continue
         # Sorted by slot: keyframes that do not move come first.

@@ -35,8 +35,8 @@ FIRST_DAMPING = 1e-5
 LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e4
 DAMPING_FACTOR = 10.0
 OPEN = 1e7
-"""A number whose variance is so many times what it were if all others were known is open: the
-scale of a map without IMU and depth, say, which only rounding and damping hold."""
+"""Ratio of a variance to that with all other unknowns known, above which the unknown counts as
+undetermined, such as the scale of a map without IMU and depth."""
 
 
 def adjust(
@@ -51,17 +51,17 @@ def adjust(
 ) -> Adjustment:
     """Move keyframes and points to where all measurements fit best.
 
-    Without inertial factors velocities and biases stay as they are. A point that nobody sees
-    stays; one seen once and without depth moves onto its ray.
+    Without inertial factors velocities and biases stay as they are. A point without
+    observations stays; one seen once and without depth moves onto its ray.
 
     Args:
         states: K keyframes in order of time.
         roles: (K,) `Role` of each.
-        points: (P, 3) in the map [m].
-        observations: Of the points in the keyframes.
+        points: (P, 3) points in the map [m].
+        observations: Observations of the points in the keyframes.
         inertial: Motions between neighbouring keyframes; the map's z axis must then point up.
-        camera: Of all keyframes.
-        T_rig_camera: The camera in the rig.
+        camera: Camera of all keyframes.
+        T_rig_camera: Pose of the camera in the rig.
         settings: Steps, robustness, priors.
 
     Returns:

@@ -16,9 +16,9 @@ class SortedObservations:
     """Observations by point and, within, by slot.
 
     Attributes:
-        keyframes, points: (M,) int64.
-        slots: (M,) int64, which moving keyframe; -1 for one that does not move.
-        measured: (M, 5), as `residuals.linearize` takes it.
+        keyframes, points: (M,) int64 indices of each observation.
+        slots: (M,) int64 number of the moving keyframe; -1 for one that does not move.
+        measured: (M, 5) measurements for `residuals.linearize`.
         starts: (P + 1,) first observation of each point.
     """
 

@@ -1,1 +1,1 @@
-"""What images alone tell about poses and points, one frame or one pair of frames at a time."""
+"""Geometry of one or two images: poses, points and descriptors."""

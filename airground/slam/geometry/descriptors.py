@@ -1,4 +1,4 @@
-"""Binary descriptors of corners, whatever the heading, and matching them.
+"""Binary descriptors of corners, independent of the heading, and their matching.
 
 ORB (Rublee et al., "ORB: an efficient alternative to SIFT or SURF", ICCV 2011) at given
 pixels: the direction of a patch is that from its centre to its centroid of intensity.
@@ -15,7 +15,7 @@ from numba import njit
 from airground.core.arrays import F64, I64, U8, U64, Floats, read_only
 
 SCALE = 1.5
-"""Images are reduced by this much first: less noise, and a patch that tells more."""
+"""Factor by which images are reduced first: less noise, and a larger patch."""
 RADIUS_PX = 15
 PAIRS, NIBBLES = np.uint64(0x5555555555555555), np.uint64(0x3333333333333333)
 BYTES, ONES = np.uint64(0x0F0F0F0F0F0F0F0F), np.uint64(0x0101010101010101)
@@ -32,8 +32,8 @@ class Described:
     """Pixels of one image and what is around them.
 
     Attributes:
-        pixels: (n, 2).
-        descriptors: (n, 4) uint64, 256 bits each.
+        pixels: (n, 2) pixels.
+        descriptors: (n, 4) uint64 descriptors of 256 bits.
     """
 
     pixels: F64
@@ -50,8 +50,8 @@ def describe(image: U8, pixels: Floats) -> Described:
     """ORB descriptors at pixels of a grey image.
 
     Args:
-        image: (height, width) grey.
-        pixels: (n, 2), inside the image.
+        image: (height, width) grey image.
+        pixels: (n, 2) pixels inside the image.
     """
     size = (round(image.shape[1] / SCALE), round(image.shape[0] / SCALE))
     small = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
@@ -149,7 +149,7 @@ def votes(query: U64, known: U64, starts: I64) -> I64:
     Args:
         query: (n, 4) descriptors.
         known: (m, 4) descriptors, group after group.
-        starts: (g + 1,) where each group begins, and m.
+        starts: (g + 1,) index at which each group begins, and m.
     """
     counts = np.zeros(len(starts) - 1, np.int64)
     for g in range(len(counts)):

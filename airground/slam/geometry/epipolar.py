@@ -51,10 +51,10 @@ def direction_by_two_rays(
     Each pair of rays spans a plane that holds the translation; two planes cross in it.
 
     Args:
-        rays_a, rays_b: (N, 2).
-        R: (3, 3) of T_a_b.
-        first, second: (S,) samples.
-        sigma: Of a residual, wrong rotation included.
+        rays_a, rays_b: (N, 2) rays of both views.
+        R: (3, 3) rotation of T_a_b.
+        first, second: (S,) indices of the sampled rays.
+        sigma: Standard deviation of a residual, with the rotation's error.
 
     Returns:
         (3,) of length 1, its sign arbitrary; NaN where no sample spans two planes.
@@ -100,11 +100,11 @@ def refine(
     """Least Sampson residuals of the inliers over rotation and direction of translation.
 
     Args:
-        rays_a, rays_b: (N, 2).
-        R0, t0: Start, and mean of the rotation's prior.
-        start_sigma: Of a residual at the start, for the first choice of inliers.
-        sigma: Of a residual's noise.
-        rotation_sigma: Of the prior, per axis [rad]; infinite without one.
+        rays_a, rays_b: (N, 2) rays of both views.
+        R0, t0: Start; R0 is also the mean of the rotation's prior.
+        start_sigma: Standard deviation of a residual at the start, to choose the first inliers.
+        sigma: Standard deviation of a residual.
+        rotation_sigma: Standard deviation of the prior, per axis [rad]; infinite without one.
 
     Returns:
         R, t of length 1, inliers (N,), and the covariance (5, 5) of direction (two tangents)

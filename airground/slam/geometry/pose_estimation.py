@@ -30,14 +30,14 @@ class PoseFit:
     """A pose and how well it is known.
 
     Attributes:
-        T_map_camera: The pose.
-        inliers: (N,) bool, which points' pixels agree with it.
+        T_map_camera: Fitted pose.
+        inliers: (N,) bool, whether a point's pixel agrees with the pose.
         rms_px: Root mean square distance of the inliers' pixels to their points; NaN
             without inliers.
-        covariance: (6, 6) of the error in the map's axes: position [m], then rotation vector
-            of estimate times inverse truth [rad]. NaN where inliers and priors leave a
+        covariance: (6, 6) covariance of the error in the map's axes: position [m], then rotation
+            vector of estimate times inverse truth [rad]. NaN where inliers and priors leave a
             direction open.
-        iterations: Steps taken.
+        iterations: Number of steps taken.
     """
 
     T_map_camera: SE3
@@ -71,16 +71,16 @@ def estimate_pose(
     left out without its pixel.
 
     Args:
-        points_map: (N, 3) [m].
-        pixels: (N, 2) where they are in the image.
-        sigmas_px: (N,) noise of the pixels, per axis.
-        camera: Of the image.
+        points_map: (N, 3) points in the map [m].
+        pixels: (N, 2) pixels of the points in the image.
+        sigmas_px: (N,) standard deviation of the pixels per axis [px].
+        camera: Camera of the image.
         T_map_camera_start: First guess, and the mean of the priors.
-        inverse_depths: (N,) measured [1/m], NaN where not; None without a depth camera.
-        inverse_depth_sigmas: (N,) their noise [1/m].
-        rotation_sigma: How well the start's rotation is known, per axis [rad]; None if not.
-        position_sigma: The same of its position [m].
-        huber: Residuals above this many sigmas count linearly.
+        inverse_depths: (N,) measured inverse depths [1/m], NaN without one; None without any.
+        inverse_depth_sigmas: (N,) standard deviation of the inverse depths [1/m].
+        rotation_sigma: Standard deviation of the start's rotation per axis [rad]; None if unknown.
+        position_sigma: Standard deviation of the start's position per axis [m]; None if unknown.
+        huber: Number of sigmas above which residuals count linearly.
 
     Raises:
         ValueError: Inverse depths come without their sigmas.

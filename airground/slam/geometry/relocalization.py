@@ -38,8 +38,8 @@ class Matches:
     """Map points recognized in an image.
 
     Attributes:
-        point_ids: (n,) int64.
-        pixels: (n, 2) where they are in the image, good to 1 to 2 px.
+        point_ids: (n,) int64 numbers of the points.
+        pixels: (n, 2) pixels of the points in the image, good to 1 to 2 px.
     """
 
     point_ids: I64
@@ -54,11 +54,11 @@ class Matches:
 
 @dataclass(frozen=True, eq=False)
 class Relocalization:
-    """Where an image was taken.
+    """The pose of an image in the map.
 
     Attributes:
-        keyframe_id: The keyframe that it was recognized by.
-        fit: The pose in the map; `fit.inliers` are over `matches`.
+        keyframe_id: Number of the keyframe with the matches.
+        fit: Pose in the map; `fit.inliers` are over `matches`.
         matches: Map points of the keyframe in the image.
     """
 
@@ -81,10 +81,10 @@ class KeyframeIndex:
         """Remember a keyframe; one added before under the same number is replaced.
 
         Args:
-            keyframe_id: Its number.
-            image: (height, width) grey.
-            point_ids: (n,) the map points in it.
-            pixels: (n, 2) where they are.
+            keyframe_id: Number of the keyframe.
+            image: (height, width) grey image.
+            point_ids: (n,) numbers of the map points in the image.
+            pixels: (n, 2) pixels of these points.
         """
         self._point_ids[keyframe_id] = np.array(point_ids, np.int64)
         self._descriptors[keyframe_id] = describe(image, pixels).descriptors
@@ -133,12 +133,12 @@ class KeyframeIndex:
         points: Callable[[I64], F64],
         among: list[int] | None = None,
     ) -> Relocalization | None:
-        """Where an image was taken; None where no keyframe tells beyond doubt.
+        """The pose of an image; None where no keyframe determines it with certainty.
 
         Args:
-            image: (height, width) grey.
-            camera: That took it.
-            points: Positions (n, 3) in the map of point numbers (n,), NaN if not mapped.
+            image: (height, width) grey image.
+            camera: Camera of the image.
+            points: Function from point numbers (n,) to positions (n, 3), NaN if not mapped.
             among: Keyframes to look at; all by default.
         """
         query = describe_corners(image)
@@ -165,8 +165,8 @@ def pose_from_matches(points_map: F64, pixels: F64, camera: PinholeCamera) -> Po
 
     Args:
         points_map: (n, 3) map points [m].
-        pixels: (n, 2) where they were recognized, partly wrongly.
-        camera: Of the image.
+        pixels: (n, 2) matched pixels, some of them wrong.
+        camera: Camera of the image.
     """
     if len(points_map) < MIN_INLIERS:
         return None

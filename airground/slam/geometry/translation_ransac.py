@@ -1,4 +1,4 @@
-"""Where the camera is when the gyro says how it is turned: two matches suffice (Sec. IV)."""
+"""The camera's position with the rotation known from the gyro: two matches suffice (Sec. IV)."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ def translation_by_known_rotation(
     """RANSAC over the camera's position, then least squares over the inliers.
 
     Args:
-        points_map: (N, 3) [m].
-        pixels: (N, 2) where they are in the image.
-        camera: Of the image.
+        points_map: (N, 3) points in the map [m].
+        pixels: (N, 2) pixels of the points in the image.
+        camera: Camera of the image.
         R_map_camera: (3, 3) known rotation.
         threshold_px: Largest distance between a pixel and its point's projection.
-        iterations: Number of samples of two.
-        rng: Draws the samples.
+        iterations: Number of samples of two matches.
+        rng: Source of the samples.
 
     Returns:
         The pose, None where no three matches agree, and (N,) the matches that agree.
@@ -68,7 +68,7 @@ def _consensus(
             cost += min(_square(points, rays, i, centre), limit)
             if cost >= best_cost:
                 break
-        # Errors count up to the threshold (MSAC): it tells apart what counting cannot.
+        # Errors count up to the threshold (MSAC), which discriminates better than counting.
         if cost < best_cost:
             best, best_cost = centre, cost
     inliers = np.zeros(n, np.bool_)

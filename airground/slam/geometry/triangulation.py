@@ -22,10 +22,10 @@ class Triangulated:
     """Points seen from two places.
 
     Attributes:
-        points: (N, 3) [m] in the map; NaN where not good.
-        depth_a: (N,) along the optical axis of view a [m]; NaN where not good.
-        inverse_depth_sigma: (N,) of 1 / depth_a for noise of 1 px per axis in both views
-            [1/m].
+        points: (N, 3) points in the map [m]; NaN where not good.
+        depth_a: (N,) depth along the optical axis of view a [m]; NaN where not good.
+        inverse_depth_sigma: (N,) standard deviation of 1 / depth_a for noise of 1 px per axis in
+            both views [1/m].
         parallax_rad: (N,) angle between the two rays.
         reprojection_px: (N,) the larger of the two distances between pixel and projection.
         good: (N,) bool, whether the rays cross in front of both cameras.
@@ -52,13 +52,13 @@ def triangulate_pairs(
 ) -> Triangulated:
     """The points with the least reprojection errors in two views.
 
-    Too little parallax is no failure here: `parallax_rad` and `inverse_depth_sigma` tell it.
+    Too little parallax is no failure here; see `parallax_rad` and `inverse_depth_sigma`.
 
     Args:
-        T_map_a: Where view a was, for all points or for each.
-        pixels_a: (N, 2) in view a.
-        T_map_b, pixels_b: The same for view b.
-        camera: That took both.
+        T_map_a: Pose of view a, for all points or for each.
+        pixels_a: (N, 2) pixels in view a.
+        T_map_b, pixels_b: Pose and pixels of view b, like those of view a.
+        camera: Camera of both views.
     """
     n = len(pixels_a)
     R_a, t_a = _each(T_map_a, n)

@@ -21,6 +21,8 @@ from airground.slam.geometry.epipolar import direction_by_two_rays, refine
 from airground.slam.geometry.triangulation import Triangulated, triangulate_pairs
 
 SAMPLES = 200
+MIN_PARALLAX_DEG = 1.5
+"""Least median angle between rays: below it, noise and the gyro's error are as large [deg]."""
 MIN_POINTS = 30
 MIN_SHARE = 0.4
 """With fewer inliers than this share of the matches the views were not of one rigid scene."""
@@ -42,12 +44,12 @@ class TwoViewStart:
     Attributes:
         T_a_b: Pose of view b in view a, scaled so that the inliers' median depth in a is 1;
             None where refused.
-        points_a: (N, 3) in view a; NaN where not an inlier.
-        inliers: (N,) bool.
+        points_a: (N, 3) points in view a; NaN where not an inlier.
+        inliers: (N,) bool, whether a match agrees.
         parallax_rad: Median angle between the inliers' rays, rotation removed (of all matches
             where there is no inlier); NaN where no pose was found.
         good: Whether the start may be used.
-        reason: Why not; empty when good.
+        reason: Reason of the refusal; empty when good.
     """
 
     T_a_b: SE3 | None
@@ -90,19 +92,16 @@ def start_from_two_views(
     R_a_b: F64 | None = None,
     rotation_sigma: float = 0.005,
     sigma_px: float = 0.5,
-    min_parallax_deg: float = 1.5,
 ) -> TwoViewStart:
     """Relative pose and points of two views, or the reason why they make no start.
 
     Args:
         pixels_a, pixels_b: (N, 2) matches, wrong ones among them.
-        camera: That took both.
-        rng: Draws the samples where the rotation is known.
+        camera: Camera of both views.
+        rng: Source of the samples where the rotation is known.
         R_a_b: (3, 3) relative rotation from the gyro; None if unknown.
-        rotation_sigma: How well it is known, per axis [rad].
-        sigma_px: Noise of a pixel, per axis.
-        min_parallax_deg: With a smaller median angle between rays there is no start: noise and
-            the gyro's error would be as large as what the points tell.
+        rotation_sigma: Standard deviation of that rotation per axis [rad].
+        sigma_px: Standard deviation of a pixel per axis [px].
     """
     n = len(pixels_a)
     if n < MIN_POINTS:
@@ -123,7 +122,7 @@ def start_from_two_views(
         return _refused(n, np.nan, "no relative pose explains the matches")
     best = min(answers, key=lambda answer: answer.cost)
     others = [a for a in answers if not a.same_as(best)]
-    return _judged(best, others, min_parallax_deg)
+    return _judged(best, others)
 
 
 def _answer(
@@ -190,14 +189,14 @@ def _unknown_rotation(rays_a: F64, rays_b: F64, threshold: float) -> list[tuple[
     ]
 
 
-def _judged(best: _Answer, others: list[_Answer], min_parallax_deg: float) -> TwoViewStart:
+def _judged(best: _Answer, others: list[_Answer]) -> TwoViewStart:
     """Scale the best answer, or say why it is not good enough."""
     n, count = len(best.inliers), int(best.inliers.sum())
     chosen = best.inliers if count else np.ones(n, bool)
     parallax = float(np.median(best.points.parallax_rad[chosen]))
     degrees = np.rad2deg(parallax)
-    if degrees < min_parallax_deg:
-        reason = f"parallax of {degrees:.2f} deg, at least {min_parallax_deg} is needed"
+    if degrees < MIN_PARALLAX_DEG:
+        reason = f"parallax of {degrees:.2f} deg, at least {MIN_PARALLAX_DEG} is needed"
     elif count < MIN_POINTS:
         reason = f"{count} matches agree, at least {MIN_POINTS} must"
     elif count < MIN_SHARE * n:

@@ -1,1 +1,1 @@
-"""What the IMU says: motion between images, rest, gravity and metric scale (Sec. IV)."""
+"""Use of the IMU: motion between images, rest, gravity and metric scale (Sec. IV)."""

@@ -46,8 +46,8 @@ class VisualNoise:
     """How far a keyframe's visual pose may be off, independent of the others.
 
     Attributes:
-        position_sigma: Of the camera's centre, per axis, in the map's own (visual) units.
-        rotation_sigma: Per axis [rad].
+        position_sigma: Standard deviation of the camera's centre per axis [visual units].
+        rotation_sigma: Standard deviation of the rotation per axis [rad].
     """
 
     position_sigma: float
@@ -63,14 +63,14 @@ class InertialAlignment:
 
     Attributes:
         scale: Metres in a visual unit; NaN where the search failed.
-        R_map_v: (3, 3), z up in the map.
-        velocities: (K, 3) of the rig in the map [m/s].
-        gyro_biases, accelerometer_biases: (K, 3) at each keyframe.
+        R_map_v: (3, 3) rotation into the map, whose z axis points up.
+        velocities: (K, 3) velocities of the rig in the map [m/s].
+        gyro_biases, accelerometer_biases: (K, 3) biases at each keyframe [rad/s], [m/s^2].
         scale_sigma: Standard deviation of the scale, as a share of it; infinite if unknown.
-        tilt_sigma: Of gravity's direction, the worse of two [rad].
+        tilt_sigma: Standard deviation of gravity's direction, the larger of two [rad].
         observable: Whether the motion shows the scale to 5 %; without it, believe nothing here.
-        rms: Of the weighted residuals by degree of freedom: 1 where the stated noise is the
-            true one. Above 1 it is already in the sigmas.
+        rms: Root mean square of the weighted residuals per degree of freedom: 1 where the stated
+            noise is the true one. Above 1 the sigmas include it.
     """
 
     scale: float
@@ -83,18 +83,6 @@ class InertialAlignment:
     observable: bool
     rms: float
 
-    @property
-    def gyro_bias(self) -> F64:
-        """(3,) at the last keyframe [rad/s]."""
-        result: F64 = self.gyro_biases[-1]
-        return result
-
-    @property
-    def accelerometer_bias(self) -> F64:
-        """(3,) at the last keyframe [m/s^2]."""
-        result: F64 = self.accelerometer_biases[-1]
-        return result
-
 
 def align(
     rotations: F64,
@@ -106,11 +94,11 @@ def align(
     """Scale and gravity of a map that began with vision alone.
 
     Args:
-        rotations: (K, 3, 3) `R_v_rig` of the keyframes, K >= 4.
-        centres: (K, 3) of their cameras, in any unit.
-        T_rig_camera: Camera in the rig.
+        rotations: (K, 3, 3) rotations `R_v_rig` of the keyframes, K >= 4.
+        centres: (K, 3) centres of the cameras, in any unit.
+        T_rig_camera: Pose of the camera in the rig.
         motions: K - 1 inertial motions between one keyframe and the next.
-        noise: Of the visual poses.
+        noise: Noise of the visual poses.
 
     Returns:
         The alignment; its map is turned as the first camera's x axis is.
@@ -149,17 +137,17 @@ def refine_scale(
     """What is left to correct in scale and tilt of a metric, upright map.
 
     Args:
-        rotations: (K, 3, 3) `R_map_rig`, K >= 4.
-        centres: (K, 3) of the cameras [m].
-        T_rig_camera: Camera in the rig.
+        rotations: (K, 3, 3) rotations `R_map_rig`, K >= 4.
+        centres: (K, 3) centres of the cameras [m].
+        T_rig_camera: Pose of the camera in the rig.
         motions: K - 1 inertial motions between neighbours, None where samples are missing.
-        noise: Of the visual poses [m], [rad].
+        noise: Noise of the visual poses [m], [rad].
 
     Returns:
         The correction: `scale` near 1, and `R_map_v` the smallest turn that makes it upright.
 
     Raises:
-        ValueError: As in `align`.
+        ValueError: Number of keyframes as in `align`.
     """
     if len(rotations) < MIN_KEYFRAMES:
         raise ValueError(f"refinement needs {MIN_KEYFRAMES} keyframes, got {len(rotations)}")

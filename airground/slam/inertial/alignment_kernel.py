@@ -22,22 +22,21 @@ BAND = 2 * STATE
 
 
 class Chain(NamedTuple):
-    """What is measured: all arrays of one chain of K keyframes.
+    """The measurements of one chain of K keyframes.
 
     Attributes:
-        rotations: (K, 3, 3) visual `R_v_rig`.
-        centres: (K, 3) of the camera, in visual units.
-        lever: (3,) the camera in the rig [m].
+        rotations: (K, 3, 3) visual rotations `R_v_rig`.
+        centres: (K, 3) centres of the camera [visual units].
+        lever: (3,) position of the camera in the rig [m].
         linked: (K - 1,) whether the inertial motion to the next keyframe is known.
-        durations: (K - 1,) [s], and so on for all that follow.
-        turns, velocities, positions: (K - 1, 3, 3) and (K - 1, 3) the inertial motions ...
-        jacobians: (K - 1, 5, 3, 3) ... by their biases, in the order of `Preintegration` ...
-        whitening: (K - 1, 9, 9) ... and what makes their errors white.
-        gyro_biases, accelerometer_biases: (K - 1, 3) at which they were summed.
-        walks: (K - 1, 2) deviations of the biases' walks.
-        sigmas: (5,) of visual rotation [rad] and position [visual units]; of the priors of
-            velocity, gyro's and accelerometer's bias where a chain begins, whose
-            means are zero.
+        durations: (K - 1,) durations of the inertial motions [s].
+        turns, velocities, positions: (K - 1, 3, 3) and (K - 1, 3) inertial motions.
+        jacobians: (K - 1, 5, 3, 3) derivatives by the biases, in the order of `Preintegration`.
+        whitening: (K - 1, 9, 9) matrices that whiten the errors of the motions.
+        gyro_biases, accelerometer_biases: (K - 1, 3) biases at the linearization.
+        walks: (K - 1, 2) standard deviations of the biases' random walks.
+        sigmas: (5,) standard deviations of visual rotation [rad] and position [visual units];
+            then of the priors of velocity, gyro and accelerometer bias at a chain's start.
     """
 
     rotations: F64
@@ -61,12 +60,12 @@ def _scatter(jacobian: F64, residual: F64, first: int, band: F64, border: F64, t
     """Add J^T J and J^T r; the last columns of J are the shared ones.
 
     Args:
-        jacobian: (m, n + 3) by the n unknowns from `first` on and by the shared ones.
-        residual: (m,).
-        first: Index of an unknown.
-        band: (30, 15 K) lower band, `band[i - j, j]`.
-        border: (15 K, 4) by the shared unknowns, and the gradient.
-        top: (3, 4) the shared unknowns' own.
+        jacobian: (m, n + 3) derivatives by the n unknowns from `first` on and by the shared ones.
+        residual: (m,) residuals.
+        first: Index of the first unknown.
+        band: (30, 15 K) lower band of the matrix, `band[i - j, j]`.
+        border: (15 K, 4) columns of the shared unknowns, and the gradient.
+        top: (3, 4) block of the shared unknowns, and their gradient.
     """
     n = jacobian.shape[1] - SHARED
     product = jacobian.T @ jacobian
@@ -171,11 +170,11 @@ def normal_equations(
 
     Args:
         chain: The measurements.
-        rotations: (K, 3, 3) `R_v_rig`.
+        rotations: (K, 3, 3) rotations `R_v_rig`.
         vectors: (K, 4, 3) position, velocity, gyro's bias, accelerometer's bias [m].
         unit: 1 / scale: visual units in a metre.
-        gravity: (3,) in the axes of v [m/s^2].
-        tilts: (3, 2) how gravity changes with its two tilts.
+        gravity: (3,) gravity in the axes of v [m/s^2].
+        tilts: (3, 2) derivative of gravity by its two tilts.
 
     Returns:
         (30, 15 K) lower band, (15 K, 4), (3, 4), float.

@@ -26,14 +26,14 @@ PIECE_S = 4.0
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Where to begin the search.
+    """Start of the search.
 
     Attributes:
         unit: Visual units in a metre; not positive where the fit failed.
-        unit_sigma: Its standard deviation, as a share.
-        gravity: (3,) in the axes of v [m/s^2].
-        velocities: (K, 3) of the rig [m/s].
-        gyro_bias, accelerometer_bias: (3,).
+        unit_sigma: Relative standard deviation of the unit.
+        gravity: (3,) gravity in the axes of v [m/s^2].
+        velocities: (K, 3) velocities of the rig [m/s].
+        gyro_bias, accelerometer_bias: (3,) biases [rad/s], [m/s^2].
     """
 
     unit: float
@@ -67,7 +67,7 @@ def closed_form(chain: Chain) -> Start:
     """Gyro's bias from rotations, then everything else from the camera centres.
 
     Args:
-        chain: Of keyframes that are all linked, at least four of them.
+        chain: Chain of at least four keyframes, all linked.
     """
     gyro_bias = gyro_bias_from_rotations(chain)
     pieces, times = _pieces(chain.durations)

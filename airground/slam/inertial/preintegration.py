@@ -41,16 +41,16 @@ class Preintegration:
     p' = p + v t + g t^2 / 2 + R `position`. All arrays are read-only. Made by `ImuBuffer`.
 
     Attributes:
-        duration_s: Between the two times [s].
-        rotation: (3, 3) of the later rig in the earlier.
-        velocity, position: (3,) [m/s], [m], in the earlier rig.
-        rotation_by_gyro_bias: (3, 3) d theta / d bias, for rotation @ exp(theta).
-        velocity_by_gyro_bias, velocity_by_accelerometer_bias: (3, 3).
-        position_by_gyro_bias, position_by_accelerometer_bias: (3, 3).
-        covariance: (9, 9) of the white noise, in the order rotation, velocity, position.
-        gyro_bias, accelerometer_bias: (3,) that were taken off the samples.
-        gyro_bias_sigma, accelerometer_bias_sigma: By how much each axis of the biases may
-            walk meanwhile.
+        duration_s: Time between start and end [s].
+        rotation: (3, 3) rotation of the rig at the end in the rig at the start.
+        velocity, position: (3,) change without gravity, in the rig at the start [m/s], [m].
+        rotation_by_gyro_bias: (3, 3) derivative d theta / d bias, for rotation @ exp(theta).
+        velocity_by_gyro_bias, velocity_by_accelerometer_bias: (3, 3) derivatives of the velocity.
+        position_by_gyro_bias, position_by_accelerometer_bias: (3, 3) derivatives of the position.
+        covariance: (9, 9) covariance by white noise, in the order rotation, velocity, position.
+        gyro_bias, accelerometer_bias: (3,) biases that were subtracted [rad/s], [m/s^2].
+        gyro_bias_sigma, accelerometer_bias_sigma: Standard deviation of the biases' random walk
+            over the motion, per axis.
         longest_gap_s: Longest time between neighbouring samples, those just outside
             included, or without any at the ends [s].
     """
@@ -97,7 +97,7 @@ class Preintegration:
 
         Args:
             R, p, v: (3, 3), (3,), (3,) of the rig in the map at the start [m], [m/s].
-            gyro_bias, accelerometer_bias: (3,).
+            gyro_bias, accelerometer_bias: (3,) biases [rad/s], [m/s^2].
         """
         rotation, velocity, position = self.corrected(gyro_bias, accelerometer_bias)
         t = self.duration_s
@@ -109,7 +109,7 @@ class ImuBuffer:
     """Inertial samples as they come, and the motion between any two times among them.
 
     Args:
-        noise: Of the sensor; gives the motions their covariance.
+        noise: Noise of the sensor, for the covariance of the motions.
     """
 
     def __init__(self, noise: ImuNoise) -> None:
@@ -184,8 +184,8 @@ class ImuBuffer:
         missing, the nearest is held. Look at `covers` and `Preintegration.longest_gap_s`.
 
         Args:
-            start_ns, end_ns: On the IMU's clock.
-            gyro_bias, accelerometer_bias: (3,) to take off [rad/s], [m/s^2].
+            start_ns, end_ns: Start and end on the IMU's clock [ns].
+            gyro_bias, accelerometer_bias: (3,) biases to subtract [rad/s], [m/s^2].
 
         Raises:
             ValueError: There are no samples, or the times do not increase.

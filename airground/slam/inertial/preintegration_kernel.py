@@ -116,12 +116,12 @@ def _mean_force(
 
     Args:
         rotation, turned: (3, 3) before and after the step, `turned = rotation @ turn`.
-        turn: (3, 3) of the step.
-        sweep: (3, 3) how the turn changes with the rate.
-        reading, following: (6,) before and after, without bias.
-        force: (3,) is set.
-        lever: (3, 3) is set to its change with the rotation before ...
-        tilt: (3, 3) ... and with the rate.
+        turn: (3, 3) turn of the step.
+        sweep: (3, 3) derivative of the turn by the rate.
+        reading, following: (6,) readings before and after the step, without bias.
+        force: (3,) mean force, set.
+        lever: (3, 3) derivative of the force by the rotation before the step, set.
+        tilt: (3, 3) derivative of the force by the rate, set.
         work: (3, 3) scratch.
     """
     _turned_force(turned, following[3:], work)
@@ -155,11 +155,11 @@ def _add_step(
     Args:
         velocity, position, jacobians: The sums.
         dt: Length of the step [s].
-        force: (3,) mean.
+        force: (3,) mean force.
         leant, turned_back: (3, 3) lever and transposed turn, times the rotation's Jacobian.
-        tilt: (3, 3) the force by the rate.
+        tilt: (3, 3) derivative of the force by the rate.
         jacobian: (3, 3) right Jacobian of the turn.
-        rotation, turned: (3, 3) before and after.
+        rotation, turned: (3, 3) rotations before and after the step.
     """
     for i in range(3):
         position[i] += dt * (velocity[i] + 0.5 * dt * force[i])
@@ -188,11 +188,11 @@ def preintegrate(
     """Rotation, velocity, position, five Jacobians, covariance and the longest gap [s].
 
     Args:
-        stamps: (N,) increasing [ns]; N >= 1.
-        readings: (N, 6) gyro [rad/s] and accelerometer [m/s^2].
+        stamps: (N,) increasing stamps [ns]; N >= 1.
+        readings: (N, 6) readings of gyro [rad/s] and accelerometer [m/s^2].
         start, end: The times between which to integrate [ns].
-        gyro_bias, accelerometer_bias: (3,) taken off the readings.
-        gyro_density, accelerometer_density: Of the white noise.
+        gyro_bias, accelerometer_bias: (3,) biases to subtract from the readings.
+        gyro_density, accelerometer_density: Densities of the white noise.
 
     Returns:
         (3, 3), (3,), (3,), (5, 3, 3), (9, 9), float. The Jacobians are of the rotation and

@@ -47,21 +47,20 @@ class ScaleFilter:
     """Scale and gravity of a visual map, image by image.
 
     Args:
-        T_rig_camera: Camera in the rig (the IMU).
-        noise: Of the visual poses, independent from image to image.
-        guess: Metres in a visual unit, only to weigh the priors.
+        T_rig_camera: Pose of the camera in the rig (the IMU).
+        noise: Noise of the visual poses, independent from image to image.
     """
 
-    def __init__(self, T_rig_camera: SE3, noise: VisualNoise, guess: float = 1.0) -> None:
+    def __init__(self, T_rig_camera: SE3, noise: VisualNoise) -> None:
         self._lever = T_rig_camera.translation
         self._noise = noise
         self._mean = np.zeros(SIZE)
-        self._mean[UNIT] = 1.0 / guess
+        self._mean[UNIT] = 1.0
         sigmas = np.empty(SIZE)
         sigmas[POSITION], sigmas[VELOCITY] = SPEED_SIGMA, SPEED_SIGMA
         sigmas[BIAS], sigmas[TILTS] = ACCELEROMETER_BIAS_SIGMA, TILT_SIGMA
         sigmas[UNIT] = UNIT_SIGMA
-        self._covariance = np.diag((sigmas / guess) ** 2)
+        self._covariance = np.diag(sigmas**2)
         self._gravity: F64 | None = None
         self._rotation: F64 | None = None
         self._images = 0
@@ -91,24 +90,14 @@ class ScaleFilter:
         """(3,) in the visual map's axes [m/s^2]; None before the first inertial motion."""
         return self._gravity
 
-    @property
-    def velocity(self) -> F64:
-        """(3,) of the rig in the visual map's axes [m/s]; NaN while the scale is."""
-        return self._mean[VELOCITY] * self.scale
-
-    @property
-    def accelerometer_bias(self) -> F64:
-        """(3,) [m/s^2]; NaN while the scale is."""
-        return self._mean[BIAS] * self.scale
-
     def add(self, rotation: F64, centre: F64, motion: Preintegration | None) -> None:
         """Take in one image.
 
         Args:
-            rotation: (3, 3) `R_v_rig` by vision.
-            centre: (3,) of the camera in the visual map.
-            motion: Since the image before; None for the first one, and where tracking or
-                samples were lost in between.
+            rotation: (3, 3) visual rotation `R_v_rig`.
+            centre: (3,) centre of the camera in the visual map.
+            motion: Inertial motion since the previous image; None for the first image, and where
+                tracking or samples were lost in between.
         """
         if motion is not None and self._rotation is not None:
             self._predict(self._rotation, motion)

@@ -14,9 +14,9 @@ MIN_SAMPLES = 10
 WIDER_THAN_NOISE = 2.0
 """At rest the readings spread no more than this times the sensor's own noise."""
 GYRO_FLOOR = 2e-3
-"""A standing robot hums: this much spread is rest, whatever the data sheet says [rad/s]."""
+"""Spread that counts as rest for any sensor [rad/s]: a standing robot vibrates."""
 ACCELEROMETER_FLOOR = 0.03
-"""The same of the accelerometer [m/s^2]."""
+"""Spread of the accelerometer that counts as rest for any sensor [m/s^2]."""
 MAX_RATE = 0.1
 """More than a bias of any gyro that is worth using: turning steadily is no rest [rad/s]."""
 MAX_OFF_GRAVITY = 0.3
@@ -37,7 +37,7 @@ class Rest:
 
     @property
     def accelerometer_bias(self) -> F64:
-        """(3,) what makes it stronger or weaker than gravity; across gravity nobody knows."""
+        """(3,) bias along gravity [m/s^2]; across gravity it cannot be observed."""
         strength = float(np.linalg.norm(self.specific_force))
         return self.specific_force * (1.0 - GRAVITY / strength)
 
@@ -45,12 +45,12 @@ class Rest:
 def at_rest(samples: ImuSamples, noise: ImuNoise) -> Rest | None:
     """The means of a run of samples if the robot stood still all the while, else None.
 
-    A hovering robot sways, and one that flies on evenly shakes: only the spread tells, since
-    an accelerometer cannot tell even motion from rest. Give it about a second.
+    Only the spread of the samples is decisive: a hovering robot sways and a flying one shakes,
+    while the mean is the same at rest and in even motion. One second of samples suffices.
 
     Args:
-        samples: Those of the last second.
-        noise: Of the sensor.
+        samples: Samples of about the last second.
+        noise: Noise of the sensor.
     """
     if len(samples.stamps_ns) < MIN_SAMPLES:
         return None
@@ -74,7 +74,7 @@ def gravity_aligned(mean_specific_force: F64, forward_hint: F64) -> F64:
     """(3, 3) `R_map_imu` of a map whose z axis points up and whose heading is the hint's.
 
     Args:
-        mean_specific_force: (3,) of a robot that does not accelerate: up, in the IMU's frame.
+        mean_specific_force: (3,) mean specific force at rest, upwards in the IMU's frame.
         forward_hint: (3,) direction in the IMU's frame that is to lie over the map's +x. A
             map begins with the camera's x axis there, `T_imu_camera.rotation[:, 0]`.
 
