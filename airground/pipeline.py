@@ -2,7 +2,7 @@
 
 Tracked frames in, events out. Each robot maps on its own; whenever the MAV has a new
 surface it is located in the ground robot's map, refined, and added to it. Tracking
-(`tracking.py`) hears nothing of all this.
+(`tracking.py`) does not depend on mapping.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class Mapping:
 
     Args:
         config: The pipeline's parameters.
-        mav, ground: What is known about the robots' sensors.
+        mav, ground: Nominal calibration of each robot.
     """
 
     def __init__(self, config: Config, mav: RobotCalibration, ground: RobotCalibration) -> None:
@@ -144,9 +144,9 @@ class Pipeline:
 
     Args:
         config: The pipeline's parameters.
-        mav, ground: What is known about the robots' sensors.
-        rng: The one source of randomness.
-        T_ground_mav_prior: Where given, refinement starts from it and the global search is
+        mav, ground: Nominal calibration of each robot.
+        rng: Source of all random numbers.
+        T_ground_mav_prior: Prior pose; if given, refinement starts from it and the global search is
             skipped (Sec. III).
     """
 
