@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from airground.augmentation import AugmentedMap
+from airground.config import Config
 from airground.core.belief import Alignment, Belief
 from airground.core.cloud import Source
 from airground.core.events import Aligned, BeliefUpdated
@@ -77,6 +78,19 @@ def run_recording(
         driven = drive(recording, tracking, pipeline, setup, [rows, *onlookers])
     rows.add_run(driven)
     return rows.result(driven.tracked, pipeline.augmented_map())
+
+
+def measure(path: Path | str, config: Config | None = None, seed: int = 0) -> RunResult:
+    """Run the pipeline over a simulated recording and measure it against its truth.
+
+    Args:
+        path: Folder of the recording.
+        config: The pipeline's parameters; the preset `best` by default.
+        seed: Seed of all random numbers.
+    """
+    recording = Recording.open(path)
+    setup = Setup(Config() if config is None else config)
+    return run_recording(recording, Truth.open(recording.path), setup, seed)
 
 
 class RunRows:

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import runpy
+import subprocess
+import sys
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import pytest
 
+import airground
 from airground.augmentation import AugmentedMap
 from airground.core.cloud import PointCloud
+from airground.io.ply import read_ply
+from airground.io.recording import Recording
 
 PAGE = Path(__file__).parents[2] / "docs" / "python_api.md"
 EXAMPLES = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
@@ -32,16 +39,56 @@ def names_after(example: str) -> dict[str, Any]:
     return runpy.run_path(str(script))
 
 
-def test_the_run_is_measured(here: None) -> None:
+def test_every_example_needs_two_import_lines_at_most() -> None:
+    for example in EXAMPLES:
+        imports = [line for line in example.splitlines() if line.startswith(("import", "from"))]
+        assert len(imports) <= 2, example
+
+
+def test_a_recording_gives_events_and_a_map(here: None) -> None:
     names = names_after(EXAMPLES[0])
-    table = names["table"]
-    assert isinstance(table, pd.DataFrame)
-    recorded = table[(table.stage == "run") & (table.metric == "recorded_s")]
-    assert recorded.value.tolist() == [names["recording"].duration_s]
-    assert isinstance(names["result"].augmented, AugmentedMap)
+    assert isinstance(names["map_"], AugmentedMap)
+    assert len(names["map_"].cloud_ground) > 1000
+    cloud, sources = read_ply(Path("augmented_map.ply"))
+    assert sources is not None
+    assert len(sources) == len(cloud) == len(names["map_"].cloud_ground)
 
 
 def test_the_pipeline_takes_every_message(here: None) -> None:
     names = names_after(EXAMPLES[1])
     assert isinstance(names["cloud"], PointCloud)
     assert len(names["cloud"]) > 1000
+
+
+def test_the_run_is_measured(here: None, small: Path) -> None:
+    names = names_after(EXAMPLES[2])
+    table = names["table"]
+    assert isinstance(table, pd.DataFrame)
+    recorded = table[(table.stage == "run") & (table.metric == "recorded_s")]
+    assert recorded.value.tolist() == [Recording.open(small).duration_s]
+    assert isinstance(names["result"].augmented, AugmentedMap)
+
+
+def test_each_name_of_the_package_is_that_of_its_module() -> None:
+    """What type checkers read is what programs get."""
+    tree = ast.parse(Path(airground.__file__).read_text(encoding="utf-8"))
+    imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module]
+    stated = {
+        alias.name: node.module
+        for node in imports
+        if node.module.startswith("airground.")
+        for alias in node.names
+    }
+    assert stated == airground._MODULE_OF
+    for name, module in stated.items():
+        assert getattr(airground, name) is getattr(import_module(module), name)
+        assert f"`{name}`" in airground.__doc__
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = airground.nothing
+
+
+def test_the_package_alone_loads_nothing_heavy() -> None:
+    heavy = "{'numpy', 'numba', 'open3d', 'pandas'}"
+    code = f"import airground, sys; print(sorted({heavy} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

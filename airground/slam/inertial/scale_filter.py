@@ -49,18 +49,19 @@ class ScaleFilter:
     Args:
         T_rig_camera: Pose of the camera in the rig (the IMU).
         noise: Noise of the visual poses, independent from image to image.
+        guess: Metres in a visual unit, only to weigh the priors.
     """
 
-    def __init__(self, T_rig_camera: SE3, noise: VisualNoise) -> None:
+    def __init__(self, T_rig_camera: SE3, noise: VisualNoise, guess: float = 1.0) -> None:
         self._lever = T_rig_camera.translation
         self._noise = noise
         self._mean = np.zeros(SIZE)
-        self._mean[UNIT] = 1.0
+        self._mean[UNIT] = 1.0 / guess
         sigmas = np.empty(SIZE)
         sigmas[POSITION], sigmas[VELOCITY] = SPEED_SIGMA, SPEED_SIGMA
         sigmas[BIAS], sigmas[TILTS] = ACCELEROMETER_BIAS_SIGMA, TILT_SIGMA
         sigmas[UNIT] = UNIT_SIGMA
-        self._covariance = np.diag(sigmas**2)
+        self._covariance = np.diag((sigmas / guess) ** 2)
         self._gravity: F64 | None = None
         self._rotation: F64 | None = None
         self._images = 0
@@ -89,6 +90,12 @@ class ScaleFilter:
     def gravity(self) -> F64 | None:
         """(3,) in the visual map's axes [m/s^2]; None before the first inertial motion."""
         return self._gravity
+
+    @property
+    def accelerometer_bias(self) -> F64:
+        """(3,) bias of the accelerometer [m/s^2]; NaN while the scale is unknown."""
+        bias: F64 = self._mean[BIAS] * self.scale
+        return bias
 
     def add(self, rotation: F64, centre: F64, motion: Preintegration | None) -> None:
         """Take in one image.
