@@ -15,40 +15,41 @@ Count = Annotated[int, Field(ge=1)]
 
 
 class Section(BaseModel):
-    """A frozen group of parameters that refuses keys it does not know."""
+    """A frozen group of parameters that rejects unknown keys."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", use_attribute_docstrings=True)
 
 
 class KeyframeSlam(Section):
-    """Keyframe-based SLAM, one of these for each robot (Sec. IV)."""
+    """Keyframe-based SLAM, one section for each robot (Sec. IV)."""
 
     corners: Count = 250
-    """Corners followed at a time."""
+    """Largest number of corners followed at a time."""
     corner_spacing_px: Count = 26
-    """They are at least this far apart when chosen [px]."""
+    """Least distance between newly chosen corners [px]."""
     corner_sigma_px: Positive = 0.7
-    """Standard deviation of a corner's place [px]."""
+    """Standard deviation of a corner's position [px]."""
     patch_px: Count = 17
-    """Side of the patch around a corner that is compared [px]."""
+    """Side of the patch that is compared around a corner [px]."""
     keyframe_parallax_px: Positive = 22.0
-    """A frame becomes a keyframe when its points moved this far, turning apart [px] ..."""
+    """Median motion of the corners since the last keyframe, without that by turning, from which
+    on a frame becomes a keyframe [px]."""
     keyframe_share: Fraction = 0.6
-    """... or when fewer than this share of the last keyframe's corners is left ..."""
+    """Share of the last keyframe's corners below which a frame becomes a keyframe."""
     keyframe_interval_s: Positive = 0.5
-    """... or, with an IMU, after this time: preintegration does not stay linear for ever [s]."""
+    """Longest time between keyframes with an IMU [s]; preintegration is linear only for a while."""
     window: Count = 10
-    """Keyframes that local bundle adjustment moves ..."""
+    """Number of newest keyframes that local bundle adjustment moves."""
     fixed_keyframes: Count = 12
-    """... and older ones that saw the same points and hold them."""
+    """Number of older keyframes with the same points, which stay fixed in that adjustment."""
     iterations: Count = 6
-    """Most steps of local bundle adjustment."""
+    """Largest number of steps of local bundle adjustment."""
     min_parallax_deg: Positive = 1.0
-    """Rays of a point must cross under this angle before it enters the map [deg]."""
+    """Least angle between the rays of a point that enters the map [deg]."""
     min_points: Count = 15
-    """Fewer map points than this in an image, and tracking is lost."""
+    """Number of map points in an image below which tracking is lost."""
     reused_keyframes: Annotated[int, Field(ge=0, le=10)] = 3
-    """Old keyframes whose points are looked for in a new one; 0 never returns to old points."""
+    """Number of old keyframes whose points are searched in a new one; 0 for none."""
 
 
 class MonocularSlam(KeyframeSlam):
@@ -63,33 +64,33 @@ class RgbdSlam(KeyframeSlam):
     """The ground robot's SLAM: colour and depth."""
 
     keyframe_parallax_px: Positive = 40.0
-    """A frame becomes a keyframe when its points moved this far, turning apart [px] ..."""
+    """Median motion of the corners since the last keyframe, without that by turning, from which
+    on a frame becomes a keyframe [px]."""
     depth_noise_per_m: Positive = 0.003
-    """Standard deviation of inverse depth as measured [1/m]."""
+    """Standard deviation of measured inverse depth [1/m]."""
     max_depth_m: Positive = 5.0
-    """Depth beyond this does not start a point [m]."""
+    """Largest depth that starts a point [m]."""
 
 
 class ViewSelection(Section):
-    """Which frames make a depth map, and which depth maps a surface (Sec. VIII-B)."""
+    """The frames of a depth map, and the depth maps of a surface (Sec. VIII-B)."""
 
     depth_map_radius_m: Positive = 0.12
-    """Views within this distance of the reference view join its depth map [m]."""
+    """Largest distance of a depth map's views from its reference view [m]."""
     fusion_radius_m: Positive = 0.70
-    """Depth maps within this distance of the first are fused [m]."""
+    """Largest distance of a surface's depth maps from the first of them [m]."""
     both_sides: bool = True
-    """Also use the views before the reference, so that what one side hides the other sees."""
+    """Whether to use the views before the reference too: they see what the later ones do not."""
     max_views: Annotated[int, Field(ge=1, le=40)] = 8
-    """At most this many views a depth map: a view joins when it is far enough from the
-    others for this many to spread over the radius."""
+    """Largest number of views per depth map; they are spread evenly over the radius."""
     min_views: Count = 4
-    """Fewer views than this make no depth map."""
+    """Least number of views of a depth map."""
     min_baseline_m: Positive = 0.06
-    """Nor do views that all lie closer than this, across the line of sight [m]."""
+    """Least baseline of a depth map's farthest view, across the line of sight [m]."""
     depth_map_spacing_m: Positive = 0.12
-    """The next reference view is this far from the last [m]."""
+    """Distance between reference views [m]."""
     min_depth_m: Positive = 0.5
-    """Nothing is reconstructed while the scene is closer than this (take-off) [m]."""
+    """Least distance of the scene for a reconstruction [m]; below it the MAV takes off or lands."""
 
 
 class PlaneSweep(Section):
@@ -98,29 +99,30 @@ class PlaneSweep(Section):
     hypotheses: Count = 100
     """Depth planes, evenly spaced in inverse depth."""
     window_px: Count = 3
-    """Side of the window over which the photometric error is averaged [px, half resolution]."""
+    """Side of the window over which the photometric error is averaged [px at half resolution]."""
     truncation: Annotated[float, Field(gt=0, le=100)] = 40.0
-    """Absolute intensity difference above which a sample counts no more [grey levels]."""
+    """Largest absolute intensity difference of a sample [grey levels]."""
     one_side_penalty: Positive = 1.0
-    """With both sides: cost above which the views of the better side decide alone, the
-    other being blocked by an edge [grey levels]."""
+    """With both sides: cost difference from which on the better side decides alone, because an
+    edge hides the scene from the other [grey levels]."""
     smoothing: Literal["none", "semiglobal"] = "semiglobal"
-    """Whether costs are joined along image rows and columns before the winner is picked."""
+    """Smoothing of the costs along image rows and columns before the best plane is chosen."""
     step_penalty: Positive = 0.5
-    """Semi-global: cost of moving by one plane between neighbours [grey levels]."""
+    """Semi-global smoothing: cost of one plane between neighbouring pixels [grey levels]."""
     jump_penalty: Annotated[float, Field(gt=0, le=25)] = 5.0
-    """Semi-global: cost of moving farther [grey levels] ..."""
+    """Semi-global smoothing: cost of more than one plane between neighbours [grey levels]."""
     edge_levels: Positive = 5.0
-    """... halved where the image changes by this much [grey levels]."""
+    """Semi-global smoothing: intensity difference of neighbours at which the cost of a jump is
+    halved [grey levels]."""
     max_curvature_sigma_m: Positive = 0.1
-    """Depth is dropped where the cost's minimum is so flat that its deviation exceeds this [m]."""
+    """Largest standard deviation of a depth, by the curvature of its cost [m]."""
 
 
 class Fusion(Section):
     """Distance fields in a histogram and their TV-L1 fusion (Sec. V, Eq. 1)."""
 
     voxels: tuple[Count, Count, Count] = (376, 240, 150)
-    """Size of the volume of interest [voxels]."""
+    """Size of the volume of interest: columns, rows, planes [voxels]."""
     truncation_m: Positive = 0.06
     """Distance at which the field reaches -1 or 1 [m]."""
     bins: Annotated[int, Field(ge=2, le=8)] = 8
@@ -128,56 +130,56 @@ class Fusion(Section):
     data_weight: Positive = 0.26
     """Lambda of Eq. 1."""
     iterations: Count = 8
-    """Primal-dual steps."""
+    """Number of primal-dual steps."""
     min_observations: Count = 2
-    """A surface point needs at least this many depth maps to count."""
+    """Least number of depth maps that see a surface point."""
     min_depth_maps: Count = 3
-    """Fewer depth maps than this are not fused."""
+    """Least number of depth maps of a surface."""
 
 
 class GroundMapping(Section):
     """The ground robot's map from RGB-D frames and poses (Sec. IV)."""
 
     keyframe_distance_m: Positive = 0.05
-    """A frame joins the map once the camera moved this far [m] ..."""
+    """Distance from the last keyframe from which on a frame becomes a keyframe [m]."""
     keyframe_angle_deg: Positive = 3.0
-    """... or turned this far [deg]."""
+    """Turn from the last keyframe from which on a frame becomes a keyframe [deg]."""
     keyframes_a_view: Count = 2
-    """No more than this many keyframes are as near to each other as that, however often the
-    robot comes back, so that the map grows with what was seen and not with time."""
+    """Largest number of keyframes within that distance and turn, so that the map grows with the
+    space and not with time."""
     max_depth_m: Positive = 4.0
-    """Depth beyond this is too noisy to keep [m]."""
+    """Largest depth to keep [m]; farther away it is too noisy."""
     voxel_m: Positive = 0.02
     """Side of a voxel of the distance field, and of the augmented map [m]."""
     truncation_m: Positive = 0.08
-    """The distance field ends this far from the surface [m]."""
+    """Distance from the surface at which the distance field ends [m]."""
     min_keyframes: Count = 3
-    """A surface that fewer keyframes saw is noise."""
+    """Least number of keyframes that see a surface point; with fewer it counts as noise."""
     follow_distance_m: Positive = 0.002
-    """The map is fused anew once SLAM moved one of its keyframes this far [m] ..."""
+    """Correction of a keyframe's position from which on the map is fused anew [m]."""
     follow_angle_deg: Positive = 0.05
-    """... or turned it this much [deg]."""
+    """Correction of a keyframe's rotation from which on the map is fused anew [deg]."""
 
 
 class HeightMaps(Section):
     """Gravity-aligned height maps (Sec. VI-A)."""
 
     cells_per_m: Positive = 25.0
-    """Resolution [cells/m]."""
+    """Resolution of height maps [cells/m]."""
     dilate_holes: bool = True
-    """Fill holes by the highest of the 3 x 3 neighbours."""
+    """Whether holes are filled with the highest of their 3 x 3 neighbours."""
 
 
 class Localization(Section):
     """Cost map and Monte Carlo localization (Sec. VI)."""
 
     cost: Literal["zmssd", "ncc"] = "ncc"
-    """Eq. 2, or one minus the normalized correlation of the overlapping heights."""
+    """Cost of a hypothesis: Eq. 2, or one minus the normalized correlation of the heights."""
     sigma: Positive = 0.05
-    """Eq. 5, in units of the cost (m^2 for zmssd, none for ncc)."""
+    """Sigma of Eq. 5, in units of the cost (m^2 for zmssd, none for ncc)."""
     sigma_units: Literal["cost", "minmax"] = "cost"
-    """Whether sigma divides the cost itself, or the cost scaled to [0, 1] over what is
-    compared: all of the map at first, the particles afterwards."""
+    """Units of sigma: those of the cost, or the range of the costs that are compared (at first
+    those of the whole cost map, then those of the particles)."""
     min_overlap: Fraction = 0.3
     """Smallest overlap, as a fraction of the aerial map's filled cells."""
     search_radius_m: Positive = 3.0
@@ -187,52 +189,53 @@ class Localization(Section):
     motion_noise_m: Positive = 0.03
     """Standard deviation of the motion model per axis [m] (Eq. 6)."""
     heading: Literal["known", "search"] = "known"
-    """Heading from the magnetometers, or searched as a third dimension of u."""
+    """Heading: known from the magnetometers, or searched as a third dimension of u."""
     headings: Count = 360
-    """Headings tried over the full circle when searched."""
+    """Number of headings over the full circle, if searched."""
     heading_noise_deg: Positive = 1.0
-    """Standard deviation of the heading's motion model when searched [deg]."""
+    """Standard deviation of the heading's motion model, if searched [deg]."""
     estimate: Literal["mean", "mode"] = "mode"
-    """Report the mean of all particles, or of those around the densest place."""
+    """Reported position: mean of all particles, or of those around the densest place."""
     redrawn_fraction: Fraction = 0.1
-    """Share of the particles drawn anew from the current cost map at each update."""
+    """Share of the particles that each update draws from the current cost map."""
     min_mode_share: Fraction = 0.6
-    """With `mode`, at least this share of the particles must be there ..."""
+    """With `mode`: least share of the particles around the reported position."""
     converged_spread_m: Positive = 0.15
-    """... and their standard deviation (with `mean`, that of all) must fall below this [m]."""
+    """Largest standard deviation of these particles (with `mean`: of all) for a claim [m]."""
     min_relief_m: Positive = 0.03
-    """Heights that deviate less than this over the overlap carry no structure [m]."""
+    """Least standard deviation of the heights over the overlap for a claim [m]."""
     min_correlation: Fraction = 0.4
-    """A belief is refused when heights at its estimate correlate less than this."""
+    """Least correlation of the heights at the estimate for a claim."""
     min_agreement: Fraction = 0.2
-    """... or agree by less than this beyond chance (Cohen's kappa, core/agreement.py)."""
+    """Least agreement of the heights beyond chance for a claim (Cohen's kappa,
+    core/agreement.py)."""
 
 
 class Refinement(Section):
     """Point-to-plane ICP and what it needs to converge (Sec. VII)."""
 
     local_search: bool = True
-    """Search the height maps around the start before ICP."""
+    """Whether the height maps around the start are searched before ICP."""
     local_search_radius_m: Positive = 0.6
     """Half the side of that search [m]."""
     local_search_cells_per_m: Positive = 25.0
-    """Its resolution [cells/m]."""
+    """Resolution of that search [cells/m]."""
     level_prior: bool = True
-    """Both maps are gravity-aligned: keep only the heading of a prior's rotation."""
+    """Whether only the heading of a prior's rotation is kept: both maps are gravity-aligned."""
     voxel_m: Positive = 0.03
-    """Clouds are averaged over cubes of this side before ICP [m]."""
+    """Side of the cubes over which clouds are averaged before ICP [m]."""
     max_distance_m: Positive = 0.3
-    """Correspondences farther apart than this are ignored at first [m] ..."""
+    """Largest distance of correspondences in the first step [m]."""
     final_distance_m: Positive = 0.05
-    """... and than this at the end [m]."""
+    """Largest distance of correspondences in the last steps [m]."""
     trim: Fraction = 0.75
-    """Share of the closest correspondences that is kept at the final distance."""
+    """Share of the closest correspondences that is kept in the last steps."""
     iterations: Count = 30
-    """Most ICP steps in all."""
+    """Largest number of ICP steps."""
     min_inliers: Fraction = 0.35
-    """An alignment is refused when fewer aerial points than this lie on the ground map ..."""
+    """Least share of the aerial points over the ground map that lie on it."""
     min_agreement: Fraction = 0.2
-    """... or when they agree with it by less than this beyond chance (core/agreement.py)."""
+    """Least agreement of the maps beyond chance (Cohen's kappa, core/agreement.py)."""
 
 
 class Config(Section):

@@ -40,7 +40,7 @@ def _section(name: str, best: Section, published: Section) -> str:
     lines += ["| parameter | `best` | `paper` | meaning |", "|---|---|---|---|"]
     for key, field in type(best).model_fields.items():
         ours, theirs = getattr(best, key), getattr(published, key)
-        meaning = " ".join((field.description or "").split())
+        meaning = " ".join((field.description or "").split()).replace("|", "\\|")
         if get_origin(field.annotation) is Literal:
             meaning += f" One of {', '.join(f'`{one}`' for one in get_args(field.annotation))}."
         shown = "-" if theirs == ours else _value(theirs)

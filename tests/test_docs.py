@@ -190,6 +190,14 @@ def test_the_page_of_metrics_is_that_of_the_table() -> None:
     assert page == made, "the table of metrics has changed: run docs/metrics.py, or make docs"
 
 
+def test_every_row_of_the_parameters_stands_alone() -> None:
+    page = (ROOT / "docs" / "parameters.md").read_text(encoding="utf-8")
+    rows = [line for line in page.splitlines() if line.startswith("| `")]
+    cells = [re.split(r"(?<!\\)\|", row) for row in rows]
+    assert [row for row, parts in zip(rows, cells, strict=True) if len(parts) != 6] == []
+    assert [row for row in rows if "..." in row or not row.rstrip(" |").endswith(".")] == []
+
+
 def test_every_parameter_is_explained() -> None:
     bare = [
         f"{section}.{name}"

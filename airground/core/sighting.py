@@ -14,10 +14,10 @@ class Sighting:
     """All that locating one aerial surface needs; a snapshot of both maps at its time.
 
     Attributes:
-        surface: What the MAV saw.
-        ground_cloud: The ground robot's map by then, in `ground`.
-        T_mav_camera: The MAV's camera when the surface became known, at `mav_stamp_ns`.
-        T_ground_camera: The ground robot's camera then, at `ground_stamp_ns`.
+        surface: Aerial surface of the MAV.
+        ground_cloud: The ground robot's map at that time, in `ground`.
+        T_mav_camera: Pose of the MAV's camera at `mav_stamp_ns`, when the surface was finished.
+        T_ground_camera: Newest pose of the ground robot's camera, at `ground_stamp_ns`.
         heading: Turn of `mav` in `ground` by the magnetometers [rad], None if unknown.
     """
 
