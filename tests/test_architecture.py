@@ -38,7 +38,7 @@ STAGES = ("slam", "dense", "localization", "refinement", "augmentation", "ground
 """Modules and packages of `airground` that only those below may bring together."""
 SHARED = ("core", "config", "errors")
 """What a stage may import from `airground`."""
-MEETING_PLACES = ("pipeline", "tracking", "link", "warm_up")
+MEETING_PLACES = ("pipeline", "run_recording", "tracking", "link", "warm_up")
 """Figure 4 above tracking; tracking, which knows nothing of what is above; what lies between;
 and what compiles all stages above tracking."""
 RECORDING_WRITERS = ("airground/io/layout.py", "airground/io/recording_writer.py")
