@@ -3,18 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Protocol
 
 import numpy as np
 
 from airground.augmentation import AugmentedMap
 from airground.config import Config
 from airground.core.events import Aligned, Event
-from airground.core.messages import RobotCalibration
+from airground.core.messages import RobotCalibration, Stamped
 from airground.core.se3 import SE3
-from airground.io.robot_recording import Pair
 from airground.pipeline import Pipeline
 from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
 from airground.tracking import FrontEnds, Trackers
+
+
+class OneRobot(Protocol):
+    """One robot's part of a recording, as far as a run needs it."""
+
+    @property
+    def calibration(self) -> RobotCalibration:
+        """Nominal calibration of the robot."""
+
+
+class TwoRobots(Protocol):
+    """A recording of both robots, as far as a run needs it; `open_recording` returns one."""
+
+    @property
+    def mav(self) -> OneRobot:
+        """The MAV's part."""
+
+    @property
+    def ground(self) -> OneRobot:
+        """The ground robot's part."""
+
+    def messages(self) -> Iterator[Stamped]:
+        """Every message of both robots in order of time."""
 
 
 class Run:
@@ -33,7 +56,7 @@ class Run:
 
     def __init__(
         self,
-        recording: Pair,
+        recording: TwoRobots,
         config: Config | None = None,
         seed: int = 0,
         T_ground_mav_prior: SE3 | None = None,
@@ -60,7 +83,7 @@ class Run:
 
 
 def run(
-    recording: Pair,
+    recording: TwoRobots,
     config: Config | None = None,
     seed: int = 0,
     T_ground_mav_prior: SE3 | None = None,

@@ -19,7 +19,7 @@ _SOURCE = [("source", "u1")]
 _PLY_TYPES = {"<f4": "float", "u1": "uchar"}
 
 
-def write_ply(path: Path, cloud: PointCloud, sources: U8 | None = None) -> None:
+def write_ply(path: Path | str, cloud: PointCloud, sources: U8 | None = None) -> None:
     """Write a cloud; `sources` (N,) becomes the property `source` that viewers ignore."""
     fields = _POSITION + (_NORMAL if cloud.normals is not None else []) + _COLOUR
     fields = fields + (_SOURCE if sources is not None else [])
@@ -38,7 +38,7 @@ def write_ply(path: Path, cloud: PointCloud, sources: U8 | None = None) -> None:
     properties = [f"property {_PLY_TYPES[kind]} {name}" for name, kind in fields]
     header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(cloud)}"]
     text = "\n".join([*header, *properties, "end_header"]) + "\n"
-    path.write_bytes(text.encode("ascii") + table.tobytes())
+    Path(path).write_bytes(text.encode("ascii") + table.tobytes())
 
 
 def read_ply(path: Path) -> tuple[PointCloud, U8 | None]:

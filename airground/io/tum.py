@@ -43,12 +43,13 @@ def parse_stamp(text: str) -> int:
     return int(whole) * SECOND_NS + int(decimals.ljust(9, "0"))
 
 
-def read_tum(path: Path) -> Trajectory:
+def read_tum(path: Path | str) -> Trajectory:
     """Read poses `timestamp tx ty tz qx qy qz qw`.
 
     Raises:
         RecordingError: A line is no pose, not finite or out of order: names file and line.
     """
+    path = Path(path)
     stamps: list[int] = []
     poses: list[SE3] = []
     for number, line in _entries(path):
@@ -81,7 +82,7 @@ def read_tum(path: Path) -> Trajectory:
     return Trajectory.from_poses(stamps, poses)
 
 
-def write_tum(path: Path, trajectory: Trajectory) -> None:
+def write_tum(path: Path | str, trajectory: Trajectory) -> None:
     """Write poses as `timestamp tx ty tz qx qy qz qw`."""
     rows = np.hstack([trajectory.translations, trajectory.quaternions_xyzw()]).tolist()
     lines = [
@@ -89,7 +90,7 @@ def write_tum(path: Path, trajectory: Trajectory) -> None:
         for stamp, row in zip(trajectory.stamps_ns.tolist(), rows, strict=True)
     ]
     text = "\n".join(["# timestamp tx ty tz qx qy qz qw", *lines])
-    path.write_text(text + "\n", encoding="utf-8")
+    Path(path).write_text(text + "\n", encoding="utf-8")
 
 
 def read_associations(path: Path) -> tuple[I64, list[str], list[str]]:
