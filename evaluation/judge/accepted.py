@@ -86,9 +86,7 @@ class Accepted(_Part):
             InputError: The reason is empty.
         """
         if not reason.strip():
-            raise InputError(
-                "--reason: state why these figures are right; the file keeps it with them"
-            )
+            raise InputError("--reason: say why these figures are right; the file keeps it")
         decision = Acceptance(
             date=on,
             git_revision=git_revision,

@@ -73,7 +73,11 @@ def _draw(axes: Axes, panel: Panel, colours: Sequence[str]) -> None:
     for column, (one, colour) in enumerate(zip(panel.runs, colours, strict=True)):
         finite = np.sort(one.each[np.isfinite(one.each)])
         # Side by side in the order of their size, so that none hides another.
-        x = column + np.linspace(-0.3, 0.08, len(finite)) if len(finite) > 1 else [column]
+        x = (
+            column + np.linspace(-0.3, 0.08, len(finite))
+            if len(finite) > 1
+            else [column] * len(finite)
+        )
         axes.plot(x, finite, "o", color=colour, alpha=0.6, markersize=3.5, markeredgewidth=0)
         bar = column + 0.25
         axes.vlines(bar, *np.clip([one.low, one.high], bottom, top), color=colour, linewidth=1.6)

@@ -23,7 +23,8 @@ def true_pose(stamp_ns: int) -> SE3:
 
 
 def front_ends(noise: PoseNoise):
-    recording = SimpleNamespace(mav_camera_stamps=STAMPS, ground_camera_stamps=STAMPS)
+    robot = SimpleNamespace(camera_stamps=STAMPS)
+    recording = SimpleNamespace(mav=robot, ground=robot)
     truth = SimpleNamespace(T_world_mav_camera=true_pose, T_world_ground_camera=true_pose)
     return oracle_front_ends(recording, truth, noise, np.random.default_rng(3))
 
