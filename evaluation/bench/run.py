@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from airground.io.recording import Recording
 from evaluation.bench.curves import CURVES, Curve, CurvePoint, exponent
 from evaluation.bench.floors import Speed
-from evaluation.bench.lane import Facts, Opened, lane_processes
+from evaluation.bench.lane import Lane, LaneProcess, Opened, lane_processes
 from evaluation.bench.machine import LoadAverage, LoadMeter, load_average
 from evaluation.bench.report import (
     SCHEMA,
@@ -28,18 +28,11 @@ from evaluation.bench.report import (
     Timing,
 )
 from evaluation.bench.rows import BY_NAME, LIVE, PIPELINE, PLAYED, Contender, Row
-from evaluation.bench.work import Turn, interleaved, wall_ratio
+from evaluation.bench.work import interleaved, wall_ratio
 from evaluation.setup.published import TimedStage
 from evaluation.setup.run_info import RunInfo
 
-
-class AnyLane(Protocol):
-    """A lane in this process or in one of its own."""
-
-    def facts(self, row: str) -> Facts: ...
-    def take_turn(self, contender: Contender | CurvePoint, seconds: float) -> Turn: ...
-    def peak_memory_mib(self, row: str) -> float | None: ...
-    def clear(self) -> None: ...
+AnyLane = Lane | LaneProcess
 
 
 def run_benchmark(
@@ -76,7 +69,7 @@ def run_benchmark(
             say(f"playing {recording.scene} through the pipeline, threads: {process.threads}")
             opened[process.threads] = process.open(path, whole)
         speeds = {count: one.speed.at_least(opened[1].speed) for count, one in opened.items()}
-        lanes: dict[int, AnyLane] = {process.threads: process for process in processes}
+        lanes = {process.threads: process for process in processes}
         rows = [played_row(name, opened) for name in names if name in PLAYED]
         for name in names:
             if name in BY_NAME:
@@ -107,11 +100,12 @@ def run_benchmark(
 
 
 def timed_row(
-    row: Row, lanes: dict[int, AnyLane], speeds: dict[int, Speed], seconds: float
+    row: Row, lanes: Mapping[int, AnyLane], speeds: dict[int, Speed], seconds: float
 ) -> RowResult:
     """A row on all its lanes and its peers on the widest, in turns."""
-    known = {count: lane.facts(row.name) for count, lane in lanes.items()}[max(lanes)]
     widest, own = max(lanes), Contender(row.name)
+    facts = {count: lane.facts(row.name) for count, lane in lanes.items()}
+    known = facts[widest]
     peers = {name: Contender(row.name, name) for name in known.peers}
     contenders = {(count, own): partial(lane.take_turn, own) for count, lane in lanes.items()}
     for peer in peers.values():

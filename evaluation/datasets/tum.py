@@ -1,6 +1,6 @@
 """The ground robot as a TUM RGB-D folder (Sturm et al., IROS 2012).
 
-rgb.txt depth.txt rgb/ depth/    16-bit depth, 5000 a metre, 0 is missing
+rgb.txt depth.txt rgb/ depth/    16-bit depth, 5000 per metre, 0 is missing
 associations.txt                 colour and depth in pairs, as their associate.py writes
 accelerometer.txt                in a Kinect's axes
 groundtruth.txt                  the colour camera in the world, at the stamp of each image

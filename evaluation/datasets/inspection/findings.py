@@ -38,7 +38,7 @@ class Finding:
     verdict: Verdict = Verdict.FINE
 
 
-def show(title: str, findings: Sequence[Finding], console: Console | None = None) -> None:
+def show(title: str, findings: Sequence[Finding]) -> None:
     """Print findings as a table."""
     colours = {Verdict.FINE: "green", Verdict.NOTED: "yellow", Verdict.WRONG: "bold red"}
     shown = Table(title=title, title_justify="left")
@@ -47,7 +47,7 @@ def show(title: str, findings: Sequence[Finding], console: Console | None = None
     for one in findings:
         colour = colours[one.verdict]
         shown.add_row(one.part, one.subject, one.found, f"[{colour}]{one.verdict}[/]")
-    (console or Console()).print(shown)
+    Console().print(shown)
 
 
 def as_json(dataset: str, layout: str, findings: Sequence[Finding]) -> str:

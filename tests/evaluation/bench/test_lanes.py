@@ -14,7 +14,7 @@ from evaluation.setup.environment import usable_cores
 
 
 def cores_and_threads() -> tuple[int, str]:
-    print("a library says something")
+    print("output of a library")
     return len(os.sched_getaffinity(0)), os.environ["NUMBA_NUM_THREADS"]
 
 
@@ -30,9 +30,9 @@ def test_a_lane_of_one_core_is_bound_to_it_and_prints_to_stderr(
         found = [lane.ask(cores_and_threads) for lane in lanes]
     assert found[0] == (1, "1")
     assert found[-1] == (here if usable_cores() > 1 else 1, str(usable_cores()))
-    said = capfd.readouterr()
-    assert said.out == ""
-    assert "a library says something" in said.err
+    printed = capfd.readouterr()
+    assert printed.out == ""
+    assert "output of a library" in printed.err
 
 
 def test_a_process_that_dies_is_an_error() -> None:

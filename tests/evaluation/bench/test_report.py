@@ -161,23 +161,25 @@ def test_the_table_shows_paper_target_floor_and_peer(report: BenchReport) -> Non
 def test_what_is_printed_states_the_conditions(report: BenchReport) -> None:
     out = io.StringIO()
     print_table(report, Console(file=out, width=200))
-    said = out.getvalue()
-    assert "real-time factor 2.00" in said
-    assert "2 cores: 800 to 1000 MiB held after the tenths of the recording, at the end 900" in said
-    assert "live, images dropped: MAV 3 of 7, ground robot 0 of 4" in said
-    assert "live, peak memory, all processes: 1100 MiB" in said
-    assert "other programs: 0.25 cores busy" in said
-    assert "measured under load" in said
-    assert "scikit-image not installed" in said
-    assert "voxels [millions]: power 1.00, of processor time 0.90" in said
-    assert "stage [ms]" in said
+    shown = out.getvalue()
+    assert "real-time factor 2.00" in shown
+    assert (
+        "2 cores: 800 to 1000 MiB held after the tenths of the recording, at the end 900" in shown
+    )
+    assert "live, images dropped: MAV 3 of 7, ground robot 0 of 4" in shown
+    assert "live, peak memory, all processes: 1100 MiB" in shown
+    assert "other programs: 0.25 cores busy" in shown
+    assert "measured under load" in shown
+    assert "scikit-image not installed" in shown
+    assert "voxels [millions]: power 1.00, of processor time 0.90" in shown
+    assert "stage [ms]" in shown
 
 
 def test_an_idle_machine_needs_no_excuse(report: BenchReport) -> None:
     idle = report.machine.model_copy(update={"other_cores": 0.02})
-    said = markdown(report.model_copy(update={"machine": idle}))
-    assert "under load" not in said
-    assert "other programs: 0.02 cores busy" in said
+    shown = markdown(report.model_copy(update={"machine": idle}))
+    assert "under load" not in shown
+    assert "other programs: 0.02 cores busy" in shown
 
 
 def test_markdown_is_a_table_of_even_width(report: BenchReport) -> None:
@@ -195,8 +197,8 @@ def test_the_docs_get_the_table_and_the_pictures(report: BenchReport, tmp_path: 
     page.write_text(f"Before\n{BEGIN}\nold\n{END}\nAfter\n", encoding="utf-8")
     publish(results, docs)
     publish(results, docs)
-    said = page.read_text(encoding="utf-8")
-    assert said == f"Before\n{BEGIN}\n\n{markdown(report)}\n{END}\nAfter\n"
+    shown = page.read_text(encoding="utf-8")
+    assert shown == f"Before\n{BEGIN}\n\n{markdown(report)}\n{END}\nAfter\n"
     pictures = sorted(path.name for path in (docs / "pictures").iterdir())
     assert pictures == ["bench.png", "bench_curves.png"]
     with pytest.raises(InputError, match="has no lines"):
@@ -219,9 +221,9 @@ def test_bars_end_at_the_medians_and_turn_dark_up_to_the_floor(report: BenchRepo
 
 
 def test_the_picture_names_rows_groups_and_conditions(report: BenchReport) -> None:
-    said = texts(bench_figure(report))
-    assert {"Stage a", "Stage b", "Stage c", "Dense", "Global"} <= set(said)
-    assert any("busy with other programs meanwhile: 0.2 cores" in text for text in said)
+    shown = texts(bench_figure(report))
+    assert {"Stage a", "Stage b", "Stage c", "Dense", "Global"} <= set(shown)
+    assert any("busy with other programs meanwhile: 0.2 cores" in text for text in shown)
 
 
 def test_curves_show_their_power(report: BenchReport) -> None:
@@ -232,9 +234,9 @@ def test_an_unknown_row_is_one_clear_line(capsys: pytest.CaptureFixture[str]) ->
     with pytest.raises(SystemExit) as exit_:
         cli.main(["bench", "--rows", "cost_map,nonsense"])
     assert exit_.value.code == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.splitlines()[-1].startswith("airground: error: --rows nonsense: unknown")
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err.splitlines()[-1].startswith("airground: error: --rows nonsense: unknown")
 
 
 def test_a_negative_time_and_an_existing_folder_are_refused(

@@ -67,9 +67,9 @@ def test_the_exit_code_and_the_json_tell_what_is_wrong(
     first, second = sorted((changed / "ground" / "rgb").iterdir())[:2]
     shutil.copyfile(first, second)
     assert airground("inspect", changed, "--json") == console.EXIT_FAULT_FOUND
-    told = json.loads(capsys.readouterr().out)
-    assert told["layout"] == "airground"
-    (one,) = [finding for finding in told["findings"] if finding["verdict"] == "wrong"]
+    printed = json.loads(capsys.readouterr().out)
+    assert printed["layout"] == "airground"
+    (one,) = [finding for finding in printed["findings"] if finding["verdict"] == "wrong"]
     assert one["subject"] == "digests"
     assert "ground/rgb: differs" in one["found"]
 
@@ -87,9 +87,9 @@ def test_all_recordings_of_a_dataset_are_looked_at(small: Path, tmp_path: Path) 
     layout, findings = inspect_dataset(tmp_path)
     assert layout == "dataset"
     assert of(findings, "", "recordings").found == "2 of 3 planned"
-    told = wrong(findings)
-    assert told[:2] == [("train/small_s1", "recording"), ("test/small_s7", "recording")]
-    assert {part.split()[0] for part, _ in told[2:]} == {"test/small_s2"}
+    defects = wrong(findings)
+    assert defects[:2] == [("train/small_s1", "recording"), ("test/small_s7", "recording")]
+    assert {part.split()[0] for part, _ in defects[2:]} == {"test/small_s2"}
     assert of(findings, "train/small_s0 mav", "images").found.startswith("21 at 30.0 Hz")
 
 

@@ -98,7 +98,7 @@ def test_samples_and_calibration_are_as_told(bag: Bag, simulated: Simulated) -> 
 
 
 def test_the_tree_of_frames_leads_to_the_camera(bag: Bag, simulated: Simulated) -> None:
-    """World to body is the truth, body to camera as told: the mounting's error is left."""
+    """World to body is the truth, body to camera nominal: the error of the mounting remains."""
     edges = {t.child_frame_id: t for t in bag["/tf_static"][0][1].transforms}
     for robot in ("mav", "ground"):
         T = SE3.identity()
@@ -108,8 +108,8 @@ def test_the_tree_of_frames_leads_to_the_camera(bag: Bag, simulated: Simulated) 
             q, t = edge.transform.rotation, edge.transform.translation
             T = T @ SE3.from_quaternion_xyzw([q.x, q.y, q.z, q.w], [t.x, t.y, t.z])
         calibration = simulated.nominal(robot).calibration()
-        told = calibration.T_body_imu @ calibration.T_imu_camera
-        assert np.abs((T.inverse() @ told).log()).max() < 1e-9
+        nominal = calibration.T_body_imu @ calibration.T_imu_camera
+        assert np.abs((T.inverse() @ nominal).log()).max() < 1e-9
         for stamp, message in bag[f"/{robot}/truth/camera"]:
             true = simulated.truth.T_world_camera(robot, stamp)
             assert np.abs((pose(message.pose).inverse() @ true).log()).max() < 1e-9

@@ -1,4 +1,4 @@
-"""`transforms.json` says truly where images were taken, in the axes that Nerfstudio reads."""
+"""`transforms.json` holds the true poses of the images, in the axes of Nerfstudio."""
 
 import json
 from collections.abc import Callable

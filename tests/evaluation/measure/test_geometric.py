@@ -27,7 +27,7 @@ CELL_M = 0.04
 
 
 def answered(name: str, given: Given) -> Answer:
-    """What a baseline says; skips where what it imports is missing."""
+    """A baseline's answer; skips the test where its module is not installed."""
     baseline = named(name)
     if baseline.module:
         pytest.importorskip(baseline.module)
