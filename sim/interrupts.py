@@ -1,4 +1,4 @@
-"""Who hears Ctrl-C when there are several processes."""
+"""Handling of Ctrl-C with several processes."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def deaf_children() -> Iterator[None]:
 
 
 def end_children() -> None:
-    """Stop every process that this one started: nobody waits for their work any more."""
+    """Stop every process that this one started, since their results are not needed any more."""
     for child in multiprocessing.active_children():
         child.terminate()
 

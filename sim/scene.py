@@ -20,7 +20,7 @@ Fraction = Annotated[float, Field(ge=0, le=1)]
 Point = tuple[float, float]
 
 MAX_HEAP_HEIGHT_M = 1.1
-"""The MAV must fly above this, whatever the seed stacks up [m]."""
+"""Least height of the MAV's flight, above any heap of any seed [m]."""
 
 
 class Part(BaseModel):

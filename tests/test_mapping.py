@@ -39,7 +39,7 @@ COVARIANCE = np.diag([1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6])
 
 
 class Scripted:
-    """A front end that says what it was told to say."""
+    """A front end that returns given answers."""
 
     def __init__(self, answers: Sequence[TrackedPose], final: Trajectory | None = None) -> None:
         self.answers = {answer.stamp_ns: answer for answer in answers}

@@ -45,13 +45,13 @@ CALIBRATION = {
 
 
 class Known:
-    """A front end that was told the poses; None where it is lost."""
+    """A front end that returns given poses; None where it is lost."""
 
     def __init__(self, poses: dict[int, SE3 | None]) -> None:
         self.poses = poses
 
     def add_imu(self, samples: ImuSamples) -> None:
-        raise AssertionError("nobody measured anything inertial here")
+        raise AssertionError("no inertial samples here")
 
     def track(self, image: MavImage | GroundImage) -> TrackedPose:
         pose = self.poses[image.stamp_ns]

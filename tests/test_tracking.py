@@ -63,14 +63,14 @@ def test_what_was_measured_before_the_first_pose_says_nothing_about_north() -> N
     noise = ImuNoise(1e-4, 1e-5, 1e-3, 1e-4)
     calibration = RobotCalibration(camera, SE3.identity(), SE3.identity(), noise)
     tracker = RobotTracker(Source.MAV, calibration, LateFrontEnd(500))  # type: ignore[arg-type]
-    told = []
+    norths = []
     for stamp_ns in range(600):
         heading = 2.0 if stamp_ns < 500 else 0.3
         field = 2e-5 * np.array([[np.cos(heading), np.sin(heading), -2.0]])
         tracker.add(MagneticSamples(np.array([stamp_ns]), field))
         frame = tracker.add(MavImage(stamp_ns, np.zeros((4, 4), np.uint8)))
         assert frame is not None
-        told.append(frame.north_rad)
+        norths.append(frame.north_rad)
     # A robot says nothing by few samples, either.
-    assert told[: 500 + MIN_SAMPLES - 1] == [None] * (500 + MIN_SAMPLES - 1)
-    assert told[500 + MIN_SAMPLES :] == pytest.approx([0.3] * (100 - MIN_SAMPLES), abs=1e-6)
+    assert norths[: 500 + MIN_SAMPLES - 1] == [None] * (500 + MIN_SAMPLES - 1)
+    assert norths[500 + MIN_SAMPLES :] == pytest.approx([0.3] * (100 - MIN_SAMPLES), abs=1e-6)

@@ -1,1 +1,1 @@
-"""What crosses rooms: rigid motions, the camera model, messages, clouds, events."""
+"""Data types that all stages share: rigid motions, cameras, messages, clouds, events."""

@@ -32,24 +32,24 @@ def make_folders(root: Path) -> None:
 
 
 def write_mav(
-    root: Path, told: RobotTable, stamps_ns: I64, imu: ImuSamples, magnetic: MagneticSamples
+    root: Path, nominal: RobotTable, stamps_ns: I64, imu: ImuSamples, magnetic: MagneticSamples
 ) -> None:
     """Write the MAV's samples, image list and `sensor.yaml` files (EuRoC)."""
     names = [mav_image_name(int(stamp)) for stamp in stamps_ns]
     write_image_list(root / layout.MAV_CAMERA_LIST, stamps_ns, names)
-    yaml = camera_yaml(told.camera, SE3.from_matrix(told.T_imu_camera))
+    yaml = camera_yaml(nominal.camera, SE3.from_matrix(nominal.T_imu_camera))
     (root / layout.MAV_CAMERA / "sensor.yaml").write_text(yaml, encoding="utf-8")
-    _write_samples(root, layout.MAV_IMU, layout.MAV_MAGNETOMETER, told, imu, magnetic)
+    _write_samples(root, layout.MAV_IMU, layout.MAV_MAGNETOMETER, nominal, imu, magnetic)
 
 
 def write_ground(
-    root: Path, told: RobotTable, stamps_ns: I64, imu: ImuSamples, magnetic: MagneticSamples
+    root: Path, nominal: RobotTable, stamps_ns: I64, imu: ImuSamples, magnetic: MagneticSamples
 ) -> None:
     """Write the ground robot's samples and image lists (TUM RGB-D, samples also EuRoC)."""
     names = [ground_image_name(int(stamp)) for stamp in stamps_ns]
     write_image_lists(root / "ground", stamps_ns, names)
     write_accelerometer(root / layout.GROUND_ACCELEROMETER, imu)
-    _write_samples(root, layout.GROUND_IMU, layout.GROUND_MAGNETOMETER, told, imu, magnetic)
+    _write_samples(root, layout.GROUND_IMU, layout.GROUND_MAGNETOMETER, nominal, imu, magnetic)
 
 
 def finish(root: Path, header: Header, image_digests: Mapping[str, Mapping[str, str]]) -> None:
@@ -74,7 +74,7 @@ def _write_samples(
     root: Path,
     imu_folder: str,
     magnetometer_folder: str,
-    told: RobotTable,
+    nominal: RobotTable,
     imu: ImuSamples,
     magnetic: MagneticSamples,
 ) -> None:
@@ -82,14 +82,14 @@ def _write_samples(
     write_imu(root / imu_folder / "data.csv", imu)
     write_magnetic(root / magnetometer_folder / "data.csv", magnetic)
     numbers = {
-        "rate_hz": told.imu.rate_hz,
-        "gyroscope_noise_density": told.imu.gyro_noise_density,
-        "gyroscope_random_walk": told.imu.gyro_bias_walk,
-        "accelerometer_noise_density": told.imu.accelerometer_noise_density,
-        "accelerometer_random_walk": told.imu.accelerometer_bias_walk,
+        "rate_hz": nominal.imu.rate_hz,
+        "gyroscope_noise_density": nominal.imu.gyro_noise_density,
+        "gyroscope_random_walk": nominal.imu.gyro_bias_walk,
+        "accelerometer_noise_density": nominal.imu.accelerometer_noise_density,
+        "accelerometer_random_walk": nominal.imu.accelerometer_bias_walk,
     }
     yaml = sensor_yaml("imu", SE3.identity(), numbers)
     (root / imu_folder / "sensor.yaml").write_text(yaml, encoding="utf-8")
-    numbers = {"rate_hz": told.magnetometer.rate_hz, "noise": told.magnetometer.noise_t}
+    numbers = {"rate_hz": nominal.magnetometer.rate_hz, "noise": nominal.magnetometer.noise_t}
     yaml = sensor_yaml("magnetometer", SE3.identity(), numbers)
     (root / magnetometer_folder / "sensor.yaml").write_text(yaml, encoding="utf-8")

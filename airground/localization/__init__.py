@@ -1,1 +1,1 @@
-"""Section VI: height maps, cost maps, and the particles that believe them."""
+"""Section VI: height maps, cost maps and Monte Carlo localization."""

@@ -1,4 +1,4 @@
-"""Section VII: the aerial cloud is aligned with the ground robot's by point-to-plane ICP."""
+"""Section VII: alignment of the aerial cloud with the ground map by point-to-plane ICP."""
 
 from airground.refinement.alignment import refine
 

@@ -1,1 +1,1 @@
-"""Where each robot is, by its own sensors (Sec. IV)."""
+"""Section IV: the pose of each robot, from its own sensors."""

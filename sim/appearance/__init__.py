@@ -1,1 +1,1 @@
-"""Generated pictures of cardboard, floors and ground, and baked light."""
+"""Generated textures of cardboard, floors and ground, with baked light."""

@@ -40,7 +40,7 @@ class Make:
     Attributes:
         board, ink, accent, tape: Display colours, 0 to 255 RGB.
         brand: Name on the box.
-        mark: Which trade mark.
+        mark: Name of the trade mark.
         weight: Boldness of the lettering.
         layout: Seed of where things are printed.
         band: Whether a band of colour runs around the sides.
@@ -82,11 +82,11 @@ def paint_face(
     """The picture of one face, upright: rows go down, columns to the right.
 
     Args:
-        make: What the box shares with others of its make.
+        make: Features that the box shares with others of its make.
         size_m: Width and height of the face [m].
-        kind: Which face it is.
+        kind: Kind of the face.
         longest_px: Pixels along the longer edge.
-        rng: Draws what this face has for itself.
+        rng: Source of the features of this face alone.
 
     Returns:
         (H, W, 3) float32 display values, 0 to 255, unlit, in the face's proportion.

@@ -21,7 +21,7 @@ def paint_concrete(size_m: tuple[float, float], px_per_m: float, rng: np.random.
     Args:
         size_m: Width and height [m].
         px_per_m: Resolution.
-        rng: Draws every mark.
+        rng: Source of every mark.
     """
     sheet = _blank(size_m, px_per_m, rng)
     _concrete_base(sheet)

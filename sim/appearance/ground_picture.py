@@ -31,8 +31,8 @@ def paint_ground(
     Args:
         size_m: Extent along x and y [m].
         px_per_m: Resolution.
-        azimuth_deg: Where the sun stands, for the shading of what is smaller than the mesh.
-        rng: Draws everything.
+        azimuth_deg: Azimuth of the sun, for the shading of details smaller than the mesh [deg].
+        rng: Source of the whole picture.
     """
     shape = (round(size_m[1] * px_per_m), round(size_m[0] * px_per_m))
     sun = np.array([np.cos(np.radians(azimuth_deg)), -np.sin(np.radians(azimuth_deg))])
@@ -164,7 +164,7 @@ def paint_rock(nodes: NDArray, diameter_m: float, rng: np.random.Generator) -> I
     Args:
         nodes: (..., 3) points on the rock [m], in any frame.
         diameter_m: Sets how large the mottles are.
-        rng: Draws them.
+        rng: Source of the stones.
     """
     points = nodes.reshape(-1, 3)
     coarse = _noise_in_space(points, 0.3 * diameter_m, rng)

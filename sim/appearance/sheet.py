@@ -20,8 +20,8 @@ class Sheet:
 
     Attributes:
         pixels: (H, W, 3) float32 display values, 0 to 255 RGB; strokes change it in place.
-        px_per_m: Its scale.
-        rng: Draws what this picture has for itself.
+        px_per_m: Scale of the picture [px/m].
+        rng: Source of the features of this picture alone.
     """
 
     pixels: Image
@@ -97,7 +97,7 @@ def light_up(pixels: NDArray, light: NDArray, out: NDArray) -> None:
     Args:
         pixels: (H, W, 3) float32 display values.
         light: (h, w, 3) float32 factors of display values, coarse.
-        out: (R, C, 3) uint8, overwritten.
+        out: (R, C, 3) uint8 result, overwritten.
     """
     rows, columns = out.shape[:2]
     # Rows of the two, stretched along x: the upper and the lower that a row of `out` is between.
@@ -125,10 +125,10 @@ def _rows_around(y: float, image: NDArray, held: NDArray, stretched: NDArray) ->
     """Have `stretched` hold the two rows around a relative height; returns the share of the lower.
 
     Args:
-        y: From 0 at the top to 1.
-        image: (H, W, 3).
-        held: (2,) which rows `stretched` holds so far; kept up to date.
-        stretched: (2, 3 C) float64.
+        y: Height in the picture, from 0 at the top to 1.
+        image: (H, W, 3) picture.
+        held: (2,) rows that `stretched` holds, kept up to date.
+        stretched: (2, 3 C) float64 two stretched rows.
     """
     first, second, share = _between(y, image.shape[0])
     if held[1] == first:

@@ -1,1 +1,1 @@
-"""Shapes of a world: boxes, terrain, rocks, surfaces, rays."""
+"""Shapes of a world: boxes, terrain and rocks, and rays against their surfaces."""

@@ -22,8 +22,8 @@ class Edges:
 
     Attributes:
         ends: (E, 2, 3) float64 the ends of each, in `world` [m].
-        faces: (E, 2) int64 which triangles meet there; twice the same if there is but one.
-        creased: (E,) bool whether it shows when both triangles do.
+        faces: (E, 2) int64 the two triangles of each edge; the same twice if there is only one.
+        creased: (E,) bool, whether an edge is visible when both triangles are.
         planes: (T, 4) float32 outward unit normal n of each triangle and the n @ x of its points.
     """
 
@@ -47,7 +47,7 @@ def find_edges(mesh: Mesh, ground: HeightField | None = None) -> Edges:
     """The edges of a closed world seen from outside its solids.
 
     Args:
-        mesh: Everything that can be seen; vertices at the same place count as one.
+        mesh: All visible triangles; vertices at the same place count as one.
         ground: Natural ground into which the rest of the mesh is sunk, if any: the lines along
             which it enters the ground are edges, too.
     """

@@ -40,7 +40,7 @@ class Rock:
 
     Attributes:
         name: Unique, `rock_000` and so on.
-        diameter_m: Its mean width.
+        diameter_m: Mean width of the rock [m].
         vertices: (6, n, n, 3) nodes of the patches in `world` [m]; patches share their rims.
     """
 

@@ -104,7 +104,7 @@ def distance_to_footprint(points: NDArray, corners: NDArray) -> float:
     """Smallest horizontal distance [m] of points (N, 2) to a convex body's shadow; 0 inside.
 
     Args:
-        points: (N, 2) [m].
+        points: (N, 2) points [m].
         corners: (C, 3) corners of the body [m]; their hull seen from above is its footprint.
     """
     hull = cv2.convexHull(corners[:, :2].astype(np.float32))[:, 0].astype(np.float64)
@@ -159,7 +159,7 @@ class _Heap:
         return np.flatnonzero(~self.parked)
 
     def park(self, boxes: NDArray) -> None:
-        """Put boxes far away where they disturb nobody."""
+        """Put boxes far away, where they touch nothing."""
         for box in boxes:
             pose = [_PARKED_M + 3 * box, 0, self.sizes[box, 2] / 2, 1, 0, 0, 0]
             self._qpos()[box] = pose

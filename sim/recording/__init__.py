@@ -1,1 +1,1 @@
-"""From a world and its robots to a recording on disk, with the truth."""
+"""Rendered images, the recording on disk, and its truth."""

@@ -28,7 +28,7 @@ def make_frames(plan: FramePlan, workers: int) -> Iterator[list[Written]]:
     """Write every frame; yields what was written, a few frames at a time, in any order.
 
     Args:
-        plan: What to make.
+        plan: Images to make.
         workers: Number of processes; with 1 the frames are made in this one.
 
     Raises:
@@ -63,7 +63,7 @@ class FrameServer:
     works too, each frame then drawn when it is asked for. A context manager.
 
     Args:
-        plan: What to make.
+        plan: Images to make.
         workers: Number of processes that draw.
     """
 

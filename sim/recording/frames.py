@@ -1,4 +1,4 @@
-"""Images of a flight: any frame of either robot, the same whoever makes it and when."""
+"""Images of a flight: any frame of either robot, the same in any process and order."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ class FramePlan:
         model: File of the compiled world with both cameras.
         edges: File of its edges.
         motion: File of both robots' motion.
-        true: How the sensors are.
+        true: True calibration of the sensors.
         preset: The faults of images and depth.
-        seeds: What the noise derives from.
-        stamps_ns: Stamps of each robot's images, as told.
+        seeds: Seeds of the noise.
+        stamps_ns: Nominal stamps of each robot's images [ns].
     """
 
     recording: Path

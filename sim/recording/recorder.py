@@ -55,9 +55,9 @@ def record(
     """Record one flight over a scene; the same arguments give the same bytes.
 
     Args:
-        scene: Which world.
+        scene: The scene of the world.
         seed: Decides the heap and, with `flight`, motion and noise.
-        preset: How good the sensors are.
+        preset: Quality of the sensors.
         out: The folder to make; it must not exist.
         duration_s: Cuts the recording short; the scene's own length if None.
         workers: Number of processes that render; one per usable core if None.
@@ -128,7 +128,7 @@ def write_all_but_images(
     motion_rng, calibration_rng, mav_rng, ground_rng = np.random.default_rng([seed, flight]).spawn(
         4
     )
-    # Without pictures, so that an impossible flight is told at once.
+    # Without pictures, so that an impossible flight is reported at once.
     world = build_world(scene, seed, pictures=False)
     motion = simulate_motion(world, scene, int(motion_rng.integers(2**63)), duration_s)
     sensors = calibrate(
@@ -139,11 +139,11 @@ def write_all_but_images(
     }
     recording_writer.make_folders(root)
     write_truth(root, world, motion, sensors.true)
-    told = sensors.told
+    nominal = sensors.nominal
     mav_samples = _samples(motion.stamps_ns, motion.mav, preset, mav_rng)
     ground_samples = _samples(motion.stamps_ns, motion.ground, preset, ground_rng)
-    recording_writer.write_mav(root, told.mav, stamps["mav"], *mav_samples)
-    recording_writer.write_ground(root, told.ground, stamps["ground"], *ground_samples)
+    recording_writer.write_mav(root, nominal.mav, stamps["mav"], *mav_samples)
+    recording_writer.write_ground(root, nominal.ground, stamps["ground"], *ground_samples)
     plan = FramePlan(
         recording=root,
         model=root / "world.mjb",
@@ -154,7 +154,7 @@ def write_all_but_images(
         seeds=(seed, flight),
         stamps_ns=stamps,
     )
-    return _header(scene, seed, flight, preset, motion, stamps, told), plan
+    return _header(scene, seed, flight, preset, motion, stamps, nominal), plan
 
 
 def store_model(plan: FramePlan, scene: Scene, seed: int) -> None:
@@ -197,7 +197,7 @@ def _header(
     preset: SensorPreset,
     motion: Motion,
     stamps: dict[Robot, NDArray[np.int64]],
-    told: CalibrationTable,
+    nominal: CalibrationTable,
 ) -> Header:
     return Header(
         scene=scene.name,
@@ -206,7 +206,7 @@ def _header(
         sensors=preset.name,
         duration_s=motion.duration_s,
         frames=FrameCounts(mav=len(stamps["mav"]), ground=len(stamps["ground"])),
-        calibration=told,
+        calibration=nominal,
         digests={},
     )
 

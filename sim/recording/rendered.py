@@ -25,13 +25,13 @@ from sim.sensors.presets import SensorPreset
 
 @dataclass(frozen=True)
 class Flight:
-    """What a recording would be made from.
+    """What a recording is made from.
 
     Attributes:
-        scene: Which world.
+        scene: The scene of the world.
         seed: Decides the heap and, with `flight`, motion and noise.
-        flight: Which flight over the same heap.
-        sensors: How good the sensors are.
+        flight: Number of the flight over the same heap.
+        sensors: Quality of the sensors.
         duration_s: Cuts the flight short; the scene's own length if None.
     """
 
@@ -64,7 +64,7 @@ def rendered(flight: Flight, workers: int) -> Iterator[Recording]:
     Its folder, with samples and truth but without images, lasts as long as the context.
 
     Args:
-        flight: What to simulate.
+        flight: Flight to simulate.
         workers: Number of processes that draw; they stay a few frames ahead of the reader.
 
     Raises:

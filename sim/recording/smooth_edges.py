@@ -32,11 +32,11 @@ def smooth_edges(
     """A picture with one sample a pixel, as if it had very many.
 
     Args:
-        picture: (height, width, channels), what is seen at the pixels' centres.
-        depth: (height, width) [m] at the same places, NaN where there is nothing.
-        camera: Its intrinsics.
-        T_world_camera: Its pose.
-        edges: Of everything that is seen.
+        picture: (height, width, channels) picture at the pixels' centres.
+        depth: (height, width) depth at the pixels' centres [m], NaN where there is nothing.
+        camera: Intrinsics of the camera.
+        T_world_camera: Pose of the camera.
+        edges: Edges of all visible meshes.
 
     Returns:
         (height, width, channels), new.
@@ -162,8 +162,8 @@ def share_beyond(distance, rise):  # type: ignore[no-untyped-def]
     """How much of a pixel lies beyond a line.
 
     Args:
-        distance: From the pixel's centre to the line, along the column [px], not negative.
-        rise: Of the line from one column to the next [px], 0 to 1.
+        distance: Distance from the pixel's centre to the line along the column [px], not negative.
+        rise: Rise of the line from one column to the next [px], 0 to 1.
     """
     whole_width = (1 - rise) / 2  # nearer lines leave the pixel at its sides
     if distance <= whole_width:

@@ -1,8 +1,8 @@
-"""The truth of a recording: written beside it, read only by those who judge.
+"""The truth of a recording: written beside it, read only by the evaluator.
 
 `truth/` holds `mav.tum` and `ground.tum` (T_world_body at the IMU's rate), `surface.ply`
 (the mesh of all that can be seen), `boxes.csv`, `calibration.toml` (the real one, in the
-schema of the told one) and `motion.npz` (the exact states).
+schema of the nominal one) and `motion.npz` (the exact states).
 """
 
 from __future__ import annotations
@@ -30,12 +30,12 @@ from sim.world.world import World
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What really was, by the stamps that the recording tells.
+    """The true motion and calibration, by the recording's nominal stamps.
 
     Attributes:
-        folder: Where it is read from.
+        folder: Folder that it was read from.
         motion: Both robots' exact states.
-        calibration: How the sensors really are.
+        calibration: True calibration of the sensors.
     """
 
     folder: Path

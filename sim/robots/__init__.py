@@ -1,1 +1,1 @@
-"""How both robots move: paths, dynamics, motion."""
+"""Motion of both robots: paths through waypoints, dynamics, and the views along them."""

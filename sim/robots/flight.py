@@ -63,7 +63,7 @@ def plan_flight(
     Args:
         mav: The scene's flight.
         floor: Height of the floor at `mav.start` [m].
-        times: (N,) of the log [s], starting at 0.
+        times: (N,) times of the log [s], starting at 0.
         rng: Makes this flight differ from that of another seed.
 
     Raises:

@@ -127,8 +127,8 @@ def simulate_motion(
     Where the time is longer than a path, the robot hovers or stands at its end.
 
     Args:
-        world: Gives the height of the floor.
-        scene: Gives the paths.
+        world: World, for the height of the floor.
+        scene: Scene with the paths.
         seed: Another seed is another flight in another magnetic anomaly; the same seed
             gives the same bytes.
         duration_s: Length of the motion; the scene's if None.

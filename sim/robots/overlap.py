@@ -33,12 +33,12 @@ _MAV_IMAGE = (8, 94, 60)
 
 @dataclass(frozen=True, eq=False)
 class Sights:
-    """Who sees what, and when, along the nominal paths.
+    """What each robot sees, and when, along the nominal paths.
 
     Attributes:
-        first_seen: (X, Y) when the ground camera first sees each cell of the floor on its whole
-            drive [s]; infinite where it never does.
-        flown: When the MAV is where an aerial map appears, every 0.7 m of flight [s], and the
+        first_seen: (X, Y) time at which the ground camera first sees each cell of the floor on its
+            whole drive [s]; infinite where it never does.
+        flown: Times at which an aerial map appears, every 0.7 m of flight [s], and the
             filled cells (X, Y) of its footprint there.
     """
 

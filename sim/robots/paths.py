@@ -67,8 +67,8 @@ class WaypointPath:
 
     Attributes:
         curve: The path; columns as in the waypoints.
-        start_s: When it starts to move.
-        end_s: When it has come to rest at the last waypoint.
+        start_s: Time at which the motion starts [s].
+        end_s: Time of rest at the last waypoint [s].
     """
 
     curve: SmoothCurve
@@ -88,7 +88,7 @@ def planar_path(
     Args:
         waypoints: (K, 2) [m], K >= 2.
         speed_mps: Speed on straight stretches, and the limit everywhere.
-        start_s: When it starts to move.
+        start_s: Time at which the motion starts [s].
         rounding_s: Step of the spline: a corner is rounded within about twice this time.
 
     Raises:
@@ -113,7 +113,7 @@ def heading_path(
         waypoints: (K, 3) [m, m, rad], K >= 2.
         speed_mps: Limit of the speed.
         turn_rps: Limit of the yaw rate [rad/s].
-        start_s: When it starts to move.
+        start_s: Time at which the motion starts [s].
         rounding_s: Step of the spline: a corner is rounded within about twice this time.
 
     Raises:
@@ -177,7 +177,7 @@ def random_curve(
 
     Args:
         rng: Source of randomness.
-        start, end: Its domain [s, or m of travel].
+        start, end: Domain of the path [s, or m of travel].
         step: Spacing of its controls; it holds little beyond the frequency 1 / (3 step).
         deviations: (D,) standard deviations; no value exceeds four of them.
     """

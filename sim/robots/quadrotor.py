@@ -108,8 +108,8 @@ class Setpoint:
 
     Attributes:
         position, velocity, acceleration: (3,) in `world` [m, m/s, m/s^2].
-        heading: Of the body's x axis [rad].
-        heading_rate: [rad/s].
+        heading: Heading of the body's x axis [rad].
+        heading_rate: Rate of the heading [rad/s].
     """
 
     position: NDArray[np.float64]
@@ -124,8 +124,8 @@ class GeometricController:
     """Tracks position and heading by tilting the thrust (Lee et al., Eq. 12, 15, 16).
 
     Attributes:
-        stiffness, damping: Of the position error [1/s^2], [1/s].
-        attitude_stiffness, attitude_damping: Of the attitude error, per inertia.
+        stiffness, damping: Gains on the position error [1/s^2], [1/s].
+        attitude_stiffness, attitude_damping: Gains on the attitude error, per inertia.
     """
 
     stiffness: float = 9.0

@@ -39,14 +39,14 @@ class RobotMotion:
     Attributes:
         positions_world: (N, 3) origin of the body [m].
         rotations_world: (N, 3, 3) body to world.
-        velocities_world: (N, 3) of the body's origin [m/s].
-        angular_velocities_body: (N, 3) [rad/s].
-        specific_force_imu: (N, 3) at the IMU's place, in its frame [m/s^2]; +9.81 upwards
+        velocities_world: (N, 3) velocities of the body's origin [m/s].
+        angular_velocities_body: (N, 3) angular velocities of the body [rad/s].
+        specific_force_imu: (N, 3) specific forces at the IMU, in its frame [m/s^2]; +9.81 upwards
             at rest.
         gyro_imu: (N, 3) in the IMU's frame [rad/s].
         field_imu: (N, 3) whole magnetic field in the IMU's frame [T].
         anomaly_imu: (N, 3) the part of `field_imu` that iron in the room adds [T].
-        mounting: Where its sensors are.
+        mounting: Poses of its sensors.
     """
 
     positions_world: NDArray[np.float64]
@@ -92,7 +92,7 @@ class RobotMotion:
         at both ends, so the error falls with the fourth power of the step.
 
         Args:
-            index: Of the state before.
+            index: Index of the state before.
             fraction: In [0, 1], of the way to the next.
             step_s: Time between the two states [s].
         """
@@ -133,9 +133,9 @@ def ideal_imu(
 
     Args:
         rotations_world: (N, 3, 3) body to world.
-        accelerations_world: (N, 3) of the body's origin [m/s^2].
-        angular_velocities_body: (N, 3) [rad/s].
-        angular_accelerations_body: (N, 3) [rad/s^2].
+        accelerations_world: (N, 3) accelerations of the body's origin [m/s^2].
+        angular_velocities_body: (N, 3) angular velocities of the body [rad/s].
+        angular_accelerations_body: (N, 3) angular accelerations of the body [rad/s^2].
         T_body_imu: The IMU in the body.
 
     Returns:

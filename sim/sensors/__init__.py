@@ -1,1 +1,1 @@
-"""What real sensors add to what perfect ones would say."""
+"""Faults of real sensors: noise, blur, drift and miscalibration, by preset."""

@@ -26,7 +26,7 @@ class ExposureDrift:
     Attributes:
         amplitude: Deviation of the logarithm of the gain.
         rates: (K,) angular frequencies [rad/s].
-        phases: (K,) [rad].
+        phases: (K,) phases [rad].
     """
 
     amplitude: float
@@ -49,9 +49,9 @@ class ImageSensor:
     """One camera with its faults.
 
     Attributes:
-        camera: Its true intrinsics.
-        noise: How large the faults are.
-        drift: Its exposure over time.
+        camera: True intrinsics of the camera.
+        noise: Size of the faults.
+        drift: Exposure over time.
         vignette: (height, width) float32 factor on the light, 1 in the middle.
     """
 
@@ -82,9 +82,9 @@ class ImageSensor:
         Args:
             sharp: (height, width, channels) a perfect picture at the middle of the exposure.
             depth: (height, width) [m], NaN where there is nothing.
-            T_start_end: How the camera moved during the exposure: its pose at the end in
+            T_start_end: Motion of the camera during the exposure: its pose at the end in
                 its frame at the start.
-            time_s: Of the exposure, for the gain.
+            time_s: Time of the exposure, for the gain [s].
             rng: For the noise.
 
         Returns:

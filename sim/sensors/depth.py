@@ -31,7 +31,7 @@ def kinect_depth(
     Args:
         depth: (height, width) true depth along the optical axis [m], NaN for nothing.
         camera: True intrinsics of the camera that depth is registered to.
-        noise: How large the faults are.
+        noise: Size of the faults.
         rng: Source of randomness.
 
     Returns:

@@ -13,8 +13,8 @@ def measure_imu(ideal: ImuSamples, noise: ImuNoise | None, rng: np.random.Genera
     """What the sensor would say.
 
     Args:
-        ideal: What a perfect one says, at equal steps of time.
-        noise: How large the faults are; None leaves the sensor perfect.
+        ideal: Readings of a perfect sensor, at equal steps of time.
+        noise: Size of the faults; None leaves the sensor perfect.
         rng: Source of randomness.
     """
     if noise is None:

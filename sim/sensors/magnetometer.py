@@ -19,10 +19,10 @@ def measure_field(
     """What the sensor would say.
 
     Args:
-        stamps_ns: (N,) of the samples.
+        stamps_ns: (N,) stamps of the samples [ns].
         field_imu: (N, 3) true field at the sensor, in its frame [T].
         anomaly_imu: (N, 3) the part of it that the building adds [T].
-        noise: How large the faults are; None gives the Earth's field alone.
+        noise: Size of the faults; None gives the Earth's field alone.
         rng: Source of randomness.
     """
     earth = field_imu - anomaly_imu

@@ -1,4 +1,4 @@
-"""What is true of the sensors, and the slightly wrong values that the pipeline is told."""
+"""True and nominal calibration of the sensors, which differ slightly."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ DEPTH_UNITS_PER_M = 5000.0
 
 @dataclass(frozen=True)
 class Calibrations:
-    """Attributes: `true` is how the sensors are, `told` what the recording says."""
+    """True calibration of the sensors, and the nominal one that the recording states."""
 
     true: CalibrationTable
-    told: CalibrationTable
+    nominal: CalibrationTable
 
 
 def calibrate(
@@ -46,13 +46,13 @@ def calibrate(
 ) -> Calibrations:
     """Draw the errors of a preset.
 
-    The cameras are as the scene says and the pipeline is told another focal length and
-    mounting; clocks and depth scale are told as they should be, and really are another.
+    The cameras are as in the scene, with another nominal focal length and mounting; clocks and
+    depth scale have their design values nominally, and other true values.
 
     Args:
         mav_focal_px: True focal length of the MAV's camera [px].
         mav, ground: True places of the sensors.
-        preset: Gives the size of the errors, and the noise that data sheets state.
+        preset: Sensor preset with the size of the errors, and the noise of the data sheets.
         rng: Source of signs and directions.
     """
     errors = preset.calibration or CalibrationErrors(0.0, 0.0, 0, 0.0)
@@ -66,7 +66,7 @@ def calibrate(
         offset_ns = int(clock * errors.time_offset_ns)
         axis = rng.standard_normal(3)
         turn = SE3.from_rotation_vector(errors.camera_to_imu * axis / np.linalg.norm(axis))
-        true, told = (
+        true, nominal = (
             RobotTable(
                 T_body_imu=pose_rows(mounting.T_body_imu),
                 T_imu_camera=pose_rows(T_imu_camera),
@@ -79,7 +79,7 @@ def calibrate(
                 (mounting.T_imu_camera @ turn, focal * (1 + sign * errors.focal), 0),
             )
         )
-        tables.append((true, told))
+        tables.append((true, nominal))
     scale = 1 + signs[4] * errors.depth_scale
     (mav_true, mav_told), (ground_true, ground_told) = tables
     return Calibrations(
@@ -107,7 +107,7 @@ def _with_depth(robot: RobotTable, units_per_m: float) -> GroundTable:
 
 
 def _imu_table(noise: ImuNoise | None) -> ImuTable:
-    """A perfect sensor is told as the usual one: filters need some noise."""
+    """The nominal noise of a perfect sensor is that of a usual one: filters need some noise."""
     noise = noise or ADIS16448
     return ImuTable(
         rate_hz=IMU_RATE_HZ,

@@ -19,7 +19,7 @@ class ImageNoise:
         shot_noise: Variance added per grey level of light [grey levels].
         vignetting: Share of the light that is lost in the corners.
         exposure_drift: Deviation of the logarithm of the gain, over seconds.
-        exposure_s: How long the shutter is open [s].
+        exposure_s: Exposure time [s].
     """
 
     read_noise: float
@@ -38,7 +38,7 @@ class DepthNoise:
         lateral_px: Deviation of a silhouette's place, on a surface seen head-on [px].
         disparity_step_px: Disparity is rounded to this [px].
         grazing_limit_deg: Angle of incidence at which half of a surface is missing [deg].
-        grazing_spread_deg: How soft that limit is [deg].
+        grazing_spread_deg: Width of the transition at that limit [deg].
         range_m: Nearest and farthest depth [m].
     """
 
@@ -55,11 +55,11 @@ class ImuNoise:
     """White noise, bias and its random walk.
 
     Attributes:
-        gyro_density: [rad/s/sqrt(Hz)]
-        gyro_walk: [rad/s^2/sqrt(Hz)]
+        gyro_density: Noise density of the gyro [rad/s/sqrt(Hz)].
+        gyro_walk: Random walk of the gyro's bias [rad/s^2/sqrt(Hz)].
         gyro_bias: Deviation of the bias at the start [rad/s].
-        accelerometer_density: [m/s^2/sqrt(Hz)]
-        accelerometer_walk: [m/s^3/sqrt(Hz)]
+        accelerometer_density: Noise density of the accelerometer [m/s^2/sqrt(Hz)].
+        accelerometer_walk: Random walk of the accelerometer's bias [m/s^3/sqrt(Hz)].
         accelerometer_bias: Deviation of the bias at the start [m/s^2].
     """
 
@@ -88,7 +88,7 @@ class MagneticNoise:
 
 @dataclass(frozen=True)
 class CalibrationErrors:
-    """Size of the difference between what the pipeline is told and what is true.
+    """Size of the difference between nominal and true calibration.
 
     Signs and directions are drawn by the seed.
 

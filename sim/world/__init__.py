@@ -1,1 +1,1 @@
-"""A scene file and a seed become a MuJoCo world."""
+"""The MuJoCo world of a scene file and a seed."""

@@ -26,8 +26,8 @@ class MagneticField:
     """The Earth's field and the anomaly of a room.
 
     Attributes:
-        positions: (K, 3) of the dipoles in `world` [m].
-        moments: (K, 3) of the dipoles [A m^2].
+        positions: (K, 3) positions of the dipoles in `world` [m].
+        moments: (K, 3) moments of the dipoles [A m^2].
     """
 
     positions: NDArray[np.float64]

@@ -35,7 +35,7 @@ def add_room(
     Args:
         texture: Contrast of the pictures, 1 as drawn.
         baker: Lights the pictures; without it, surfaces get plain colours.
-        rng: Draws the pictures.
+        rng: Source of the pictures.
     """
     add_ground_plane(spec)
     _add_floor(spec, room, texture, baker, rng)

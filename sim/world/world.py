@@ -34,7 +34,7 @@ class World:
     """Everything that stands still, with no joints.
 
     Attributes:
-        scene, seed: What it was built from.
+        scene, seed: Scene and seed of the world.
         spec: MuJoCo specification to add robots and cameras to, then compile. Frame `world`.
         vertices: (V, 3) float64, the true surface in `world` [m].
         triangles: (T, 3) int64 vertex indices, counter-clockwise seen from outside.
@@ -69,7 +69,7 @@ def build_world(scene: Scene, seed: int, pictures: bool = True) -> World:
     """Build the world of `scene`; the same seed gives the same bytes.
 
     Args:
-        scene: What to build.
+        scene: Scene to build.
         seed: Decides shapes, poses and pictures; paths do not depend on it.
         pictures: Without them surfaces have plain colours: the same geometry much sooner,
             for physics and truth.

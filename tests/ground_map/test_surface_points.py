@@ -77,7 +77,7 @@ def plane_field(normal: np.ndarray, offset: float, weight: float = 3.0) -> Block
     z, y, x = np.meshgrid(*[np.arange(BLOCK)] * 3, indexing="ij")
     voxels = np.stack([x, y, z], axis=-1) + BLOCK * places[:, None, None, None]
     tsdf = (voxels @ normal - offset).astype(np.float32)
-    # Colours grow along x, so that a point's tells where it is.
+    # Colours grow along x, so that a point's gives its place.
     colour = np.repeat(100.0 + voxels[..., :1], 3, axis=-1).astype(np.float32) * COLOUR_SCALE
     rows = np.arange(8, dtype=np.int32)
     return BlockedField(places, rows, tsdf, np.full_like(tsdf, weight), colour, VOXEL_M)

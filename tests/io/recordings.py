@@ -86,9 +86,9 @@ def images(index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def write_recording(root: Path) -> Path:
     make_folders(root)
-    told = calibration()
-    write_mav(root, told.mav, MAV_STAMPS, imu_samples(), magnetic_samples())
-    write_ground(root, told.ground, GROUND_STAMPS, imu_samples(), magnetic_samples())
+    nominal = calibration()
+    write_mav(root, nominal.mav, MAV_STAMPS, imu_samples(), magnetic_samples())
+    write_ground(root, nominal.ground, GROUND_STAMPS, imu_samples(), magnetic_samples())
     digests: dict[str, dict[str, str]] = {folder: {} for folder in layout.IMAGE_FOLDERS}
     for index, (mav, ground) in enumerate(zip(MAV_STAMPS, GROUND_STAMPS, strict=True)):
         grey, colour, units = images(index)
@@ -106,7 +106,7 @@ def write_recording(root: Path) -> Path:
         sensors="nominal",
         duration_s=0.2,
         frames=FrameCounts(mav=4, ground=4),
-        calibration=told,
+        calibration=nominal,
         digests={},
     )
     finish(root, header, digests)

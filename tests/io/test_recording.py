@@ -1,4 +1,4 @@
-"""What was written is what is read, in order; what is damaged is told in one line."""
+"""What was written is what is read, in order; damage is an error of one line."""
 
 import re
 from pathlib import Path

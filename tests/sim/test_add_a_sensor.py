@@ -45,8 +45,8 @@ def test_a_recording_is_made_with_the_preset(
     recording, truth = Recording.open("recordings/home"), Truth.open("recordings/home")
     recording.verify()
     assert recording.sensors == "home"
-    told, true = recording.mav.calibration.camera, truth.camera("mav")
-    assert abs(told.fx / true.fx - 1) == pytest.approx(2e-3)
+    nominal, true = recording.mav.calibration.camera, truth.camera("mav")
+    assert abs(nominal.fx / true.fx - 1) == pytest.approx(2e-3)
     assert abs(truth.sensors("mav").camera.time_offset_ns) == 2_000_000
 
 

@@ -1,4 +1,4 @@
-"""Nobody works on for a parent that is gone."""
+"""No process outlives its parent."""
 
 import multiprocessing
 import os

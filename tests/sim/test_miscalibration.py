@@ -1,4 +1,4 @@
-"""The pipeline is told values that are off by the size of the preset, no more, no less."""
+"""Nominal values differ from true ones by the size of the preset, no more, no less."""
 
 import numpy as np
 import pytest
@@ -19,10 +19,10 @@ def drawn(preset: SensorPreset, seed: int = 0) -> Calibrations:
 
 
 def test_without_errors_the_truth_is_told() -> None:
-    true, told = drawn(NONE).true, drawn(NONE).told
-    assert (true.mav.camera, true.ground.camera) == (told.mav.camera, told.ground.camera)
-    assert true.ground.depth == told.ground.depth
-    for one, other in ((true.mav, told.mav), (true.ground, told.ground)):
+    true, nominal = drawn(NONE).true, drawn(NONE).nominal
+    assert (true.mav.camera, true.ground.camera) == (nominal.mav.camera, nominal.ground.camera)
+    assert true.ground.depth == nominal.ground.depth
+    for one, other in ((true.mav, nominal.mav), (true.ground, nominal.ground)):
         np.testing.assert_allclose(one.T_imu_camera, other.T_imu_camera, atol=1e-12)
 
 
@@ -30,16 +30,18 @@ def test_without_errors_the_truth_is_told() -> None:
 @pytest.mark.parametrize("robot", ["mav", "ground"])
 def test_sizes_of_the_errors(preset: SensorPreset, times: int, robot: str) -> None:
     calibrations = drawn(preset)
-    true, told = getattr(calibrations.true, robot), getattr(calibrations.told, robot)
-    assert abs(told.camera.fx / true.camera.fx - 1) == pytest.approx(times * 1e-3)
-    assert told.camera.fx == told.camera.fy
-    turn = true.calibration().T_imu_camera.inverse() @ told.calibration().T_imu_camera
+    true, nominal = getattr(calibrations.true, robot), getattr(calibrations.nominal, robot)
+    assert abs(nominal.camera.fx / true.camera.fx - 1) == pytest.approx(times * 1e-3)
+    assert nominal.camera.fx == nominal.camera.fy
+    turn = true.calibration().T_imu_camera.inverse() @ nominal.calibration().T_imu_camera
     assert np.rad2deg(turn.angle()) == pytest.approx(times * 0.1)
     assert np.abs(turn.translation).max() < 1e-12
-    assert told.T_body_imu == true.T_body_imu
-    assert told.camera.time_offset_ns == 0
+    assert nominal.T_body_imu == true.T_body_imu
+    assert nominal.camera.time_offset_ns == 0
     assert abs(true.camera.time_offset_ns) == times * 1_000_000
-    scale = calibrations.true.ground.depth.units_per_m / calibrations.told.ground.depth.units_per_m
+    scale = (
+        calibrations.true.ground.depth.units_per_m / calibrations.nominal.ground.depth.units_per_m
+    )
     assert abs(scale - 1) == pytest.approx(times * 3e-3)
 
 

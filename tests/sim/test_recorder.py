@@ -105,8 +105,8 @@ def test_distances_to_the_surface(perfect: Path) -> None:
 
 def test_depth_errs_by_scale_and_noise_only(nominal: Path) -> None:
     recording, truth = Recording.open(nominal), Truth.open(nominal)
-    told = recording.depth_units_per_m
-    scale = truth.calibration.ground.depth.units_per_m / told
+    nominal = recording.depth_units_per_m
+    scale = truth.calibration.ground.depth.units_per_m / nominal
     assert abs(scale - 1) == pytest.approx(3e-3)
     ratios = []
     for image in map(recording.ground.read_image, range(len(recording.ground.camera_stamps))):

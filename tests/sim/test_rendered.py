@@ -52,8 +52,8 @@ def test_all_is_as_if_recorded_and_read(stored: Path) -> None:
         assert len(messages) == 2 * 3 * FRAMES
         for one, other in zip(messages, drawn.messages(), strict=True):
             assert_same(one, other)
-        told = recording.header.model_dump(exclude={"digests"})
-        assert drawn.header.model_dump(exclude={"digests"}) == told
+        nominal = recording.header.model_dump(exclude={"digests"})
+        assert drawn.header.model_dump(exclude={"digests"}) == nominal
         drawn_truth = Truth.open(drawn.path)
         stamp = int(recording.ground.camera_stamps[1])
         np.testing.assert_array_equal(

@@ -90,7 +90,7 @@ def test_or_as_the_body_is_taken_to_be_where_the_robot_accelerates(scale: float)
 
 
 class Scripted:
-    """Says what motion it was told to say, and notes between which frames."""
+    """Returns given motions, and records between which frames."""
 
     def __init__(self, motions: list[SE3 | None]) -> None:
         self.motions = motions

@@ -204,7 +204,7 @@ def test_a_point_seen_once_moves_onto_its_ray_and_tells_nothing():
     problem = made.make(4, 60, 40, inertial=False)
     roles = made.fixed(problem.states, 2)
     states, points = made.perturbed(problem, roles)
-    # Point 0 in one keyframe only; a point 60 that nobody sees.
+    # Point 0 in one keyframe only; a point 60 without observations.
     o = problem.observations
     first = np.flatnonzero((o.points == 0) & (o.keyframes == o.keyframes[o.points == 0].max()))
     without = replace(problem, observations=only(o, o.points != 0))

@@ -1,4 +1,4 @@
-"""A ground robot whose map slipped comes back and finds it closed; other places fool nobody."""
+"""A ground robot whose map slipped comes back and closes the loop; other places close none."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ def test_a_map_given_up_takes_all_that_was_known_of_its_unit_along(config: Confi
     assert begun[DARK - 1]
     assert not begun[-1]
     assert set(answers) == {Tracking.INITIALIZING}
-    # What begins now is between two views, in a unit that nobody knows.
+    # What begins now is between two views, in an unknown unit.
     assert not front_end._slam.metric
     assert not front_end._slam.inertial
     assert not front_end._scale.known

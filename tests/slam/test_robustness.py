@@ -174,7 +174,7 @@ def test_missing_inertial_samples_do_not_matter(
 def test_a_hole_before_the_first_pose_begins_another_map(
     dark_s: tuple[float, float], silent_s: tuple[float, float] | None
 ) -> None:
-    """Undisturbed, the first pose comes at 3.2 s; beyond the hole nobody knows where that was."""
+    """Undisturbed, the first pose comes at 3.2 s; beyond the hole that place is unknown."""
     whole = hard.flight(*TAKE_OFF, Leg(8.0, speed_mps=0.5, sway=1.0), height_m=FLOOR_M)
     sequence = hard.darkened(whole, *dark_s)
     if silent_s is not None:
@@ -299,7 +299,7 @@ def test_the_ground_robot_may_start_in_motion(sway: float) -> None:
 
 @pytest.mark.slow
 def test_a_flight_that_never_turns_gets_poses_all_the_same() -> None:
-    """Its tilt cannot be told from the accelerometer's bias, ever."""
+    """Its tilt can never be separated from the accelerometer's bias."""
     sequence = hard.flight(*TAKE_OFF, Leg(9.0, speed_mps=0.5), height_m=FLOOR_M)
     tracked = tracked_by(sequence)
     assert_no_silent_jump(sequence, tracked)

@@ -170,4 +170,4 @@ def test_candidates_of_a_culled_keyframe_begin_where_they_were_seen_next() -> No
     assert sparse_map.states[8] == CANDIDATE
     assert sparse_map.origins[8] == 1
     np.testing.assert_array_equal(sparse_map.first_pixels[8], [8.0, 0.0])
-    assert sparse_map.states[9] == DROPPED  # nobody else saw it
+    assert sparse_map.states[9] == DROPPED  # seen by no other keyframe

@@ -1,4 +1,4 @@
-"""Rest is told from hovering and driving, and gives gravity and the gyro's bias."""
+"""Rest is distinguished from hovering and driving, and gives gravity and the gyro's bias."""
 
 import numpy as np
 import pytest
