@@ -15,11 +15,11 @@ import numpy as np
 from airground.core.cloud import Source
 from airground.core.events import Sighted, SurfaceCast
 from airground.core.sighting import Sighting
+from airground.ground_map import FixedMap
 from airground.io.robot_recording import Pair
 from airground.pipeline import Pipeline
 from airground.tracking import TrackedFrame
 from airground.warm_up import warm_up_mapping
-from evaluation.run.given_map import enter
 from evaluation.run.onlooker import Onlooker, Seen, timed
 from evaluation.run.tracking import Tracking
 from evaluation.setup.environment import settle
@@ -52,7 +52,8 @@ def pipeline_for(recording: Pair, setup: Setup, rng: np.random.Generator) -> Pip
     """The shipped pipeline under a setup, with the ground map that the setup gives, if any."""
     mav, ground = recording.mav.calibration, recording.ground.calibration
     pipeline = Pipeline(setup.config, mav, ground, rng)
-    enter(setup.given, pipeline)
+    if setup.given.ground_map is not None:
+        pipeline.mapping.ground_map = FixedMap(setup.given.ground_map)
     return pipeline
 
 

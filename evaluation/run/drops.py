@@ -1,4 +1,4 @@
-"""Which frames a live run did without: with this list, a run offline gives the same bytes."""
+"""The drop list of a live run, with which a run offline gives the same bytes."""
 
 from __future__ import annotations
 
@@ -27,23 +27,24 @@ class _Part(BaseModel):
 
 
 class Stamps(_Part):
-    """Images by their stamps [ns], of each robot."""
+    """Stamps of images of each robot [ns]."""
 
     mav: frozenset[int] = frozenset()
     ground: frozenset[int] = frozenset()
 
     def by_robot(self) -> dict[Source, frozenset[int]]:
+        """The stamps by robot."""
         return {Source.MAV: self.mav, Source.GROUND: self.ground}
 
 
 class DropList(_Part):
-    """What `dropped.json` holds.
+    """Contents of `dropped.json`.
 
     Attributes:
         recording: Fingerprint of the recording.
-        dropped: Images that their tracker never saw.
+        dropped: Images that did not reach their tracker.
         unmapped: Images that were tracked, but did not reach the mapper.
-        jpeg_quality: Of the MAV's images as the mapper got them; None where uncompressed.
+        jpeg_quality: JPEG quality of the MAV's images at the mapper; None if not compressed.
     """
 
     schema_: Literal[1] = Field(alias="schema")
@@ -57,7 +58,7 @@ class DropList(_Part):
         """Read a list that was made with this recording.
 
         Raises:
-            InputError: The file is missing, no such list, or of another recording.
+            InputError: The file is missing, malformed, or of another recording.
         """
         made = read_checked(cls, path, "list of drops")
         if made.recording != fingerprint(recording):
@@ -68,14 +69,14 @@ class DropList(_Part):
         return made
 
     def write(self, path: Path) -> None:
-        """Stamps are sorted, so that the same list gives the same bytes."""
-        told = self.model_dump(by_alias=True)
+        """Write with sorted stamps, so that the same list gives the same bytes."""
+        content = self.model_dump(by_alias=True)
         for kind in ("dropped", "unmapped"):
-            told[kind] = {robot: sorted(stamps) for robot, stamps in told[kind].items()}
-        path.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+            content[kind] = {robot: sorted(stamps) for robot, stamps in content[kind].items()}
+        path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
     def received(self, frames: Iterable[TrackedFrame]) -> Iterator[TrackedFrame]:
-        """Of all tracked frames those that reached the mapper, as they reached it."""
+        """Tracked frames that reached the mapper, compressed as they reached it."""
         for frame in without(frames, self.unmapped.by_robot()):
             if self.jpeg_quality is not None and isinstance(frame.image, MavImage):
                 yield replace(frame, image=as_received(frame.image, self.jpeg_quality))
@@ -84,11 +85,11 @@ class DropList(_Part):
 
 
 def fingerprint(recording: Recording) -> str:
-    """The same for the same recording only."""
+    """Digest that identifies a recording."""
     digests = json.dumps(recording.header.digests, sort_keys=True)
     return hashlib.sha256(digests.encode()).hexdigest()
 
 
 def nothing_dropped(recording: Recording) -> DropList:
-    """The list of a run that takes its time."""
+    """The empty list, of a run offline."""
     return DropList(schema=SCHEMA, recording=fingerprint(recording))

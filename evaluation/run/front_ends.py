@@ -36,7 +36,7 @@ class WatchedFrontEnds:
     slam: frozenset[str]
 
     def front_ends(self) -> FrontEnds:
-        """In the form that trackers take."""
+        """The front ends, as trackers take them."""
         return FrontEnds(self.mav, self.ground)
 
     def of(self, robot: Source) -> WatchedFrontEnd[Any]:
@@ -57,7 +57,7 @@ class WatchedFrontEnds:
 def front_ends_for(
     setup: Setup, recording: Pair, truth: Truth | None, rng: np.random.Generator
 ) -> WatchedFrontEnds:
-    """The front ends of a setup: SLAM, an oracle, or a file, for each robot.
+    """The front ends of a setup, for each robot.
 
     Args:
         setup: Choice of the front ends.

@@ -1,4 +1,4 @@
-"""A map of the ground from a file, in place of the one that the pipeline would make."""
+"""A ground map from a file, in place of the pipeline's own."""
 
 from __future__ import annotations
 
@@ -9,26 +9,19 @@ import open3d as o3d
 
 from airground.core.cloud import PointCloud
 from airground.errors import InputError
-from airground.ground_map import FixedMap
-from airground.pipeline import Pipeline
-from evaluation.setup.setups import Given
 
 GREY = 128
+"""Level of points without colours: the middle of 0 to 255."""
+
 MAX_EXTENT_M = 1000.0
-"""A larger map is in another unit."""
-
-
-def enter(given: Given, pipeline: Pipeline) -> None:
-    """Put the map that was brought along, if any, in place of the pipeline's own."""
-    if given.ground_map is not None:
-        pipeline.mapping.ground_map = FixedMap(given.ground_map)
+"""Largest coordinate [m]: a larger map is in another unit."""
 
 
 def read_map(path: Path) -> PointCloud:
-    """A cloud, or the vertices of a mesh, from a PLY file of any kind; grey without colours.
+    """A cloud, or the vertices of a mesh, from any PLY file; grey without colours.
 
     Raises:
-        InputError: It cannot be read, is empty, not finite, or too large to be in metres.
+        InputError: The file cannot be read, or its points are none, not finite or not in metres.
     """
     _check_claim(path)
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
@@ -51,7 +44,7 @@ def read_map(path: Path) -> PointCloud:
 
 
 def _check_claim(path: Path) -> None:
-    """InputError where a header claims more points than its file has bytes."""
+    """Raise InputError if a header claims more elements than its file has bytes."""
     try:
         with path.open("rb") as file:
             start = file.read(4096)

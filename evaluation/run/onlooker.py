@@ -41,7 +41,7 @@ STAGE_OF: dict[type[Event], str] = {
     MapAugmented: "augmentation",
     GroundMapExtended: "ground_map",
 }
-"""Names of the timed stages."""
+"""Name of the timed stage that ends with each event."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,11 +66,11 @@ class Onlooker(Protocol):
     """A consumer of a run's events. It changes nothing in the run."""
 
     def see(self, seen: Seen) -> None:
-        """Take in one event, while no stage runs; called in order of the events."""
+        """Consume one event; called in order of the events, while no stage runs."""
 
 
 def timed(events: Iterable[Event]) -> Iterator[tuple[Event, float]]:
-    """Each event with the time that it took to come [ms]."""
+    """Each event with its duration [ms]."""
     iterator = iter(events)
     while True:
         start = time.perf_counter()

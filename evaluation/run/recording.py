@@ -32,10 +32,10 @@ from sim.recording.truth import Truth
 
 @dataclass(frozen=True)
 class RunResult:
-    """What a run leaves.
+    """Outcome of a run.
 
     Attributes:
-        table: Everything measured.
+        table: All rows.
         tracked: Answers of the front ends, by robot ("mav", "ground").
         augmented: The augmented map.
         T_ground_mav: The newest accepted alignment; None where there is none.
@@ -68,8 +68,7 @@ def run_recording(
         seed: Seed of all random numbers.
         drops: Frames to leave out, from a live run.
         onlookers: Consumers of every event; their time counts for the run, not for a stage.
-        apart: Whether each robot is tracked in a process of its own, which is faster and gives
-            the same result.
+        apart: Whether to track each robot in its own process: faster, with the same result.
     """
     task = TrackingTask(recording, truth, setup, seed, drops)
     pipeline = pipeline_for(recording, setup, localizer_rng(seed, recording.flight))
@@ -124,7 +123,7 @@ class RunRows:
             self.out.add("timing", STAGE_OF[type(seen.event)], seen.duration_ms, "ms")
 
     def add_run(self, driven: Driven) -> None:
-        """Write how long the run took, and its memory."""
+        """Write the duration and the memory of the run."""
         self.out.add("run", "recorded_s", self._recorded_s, "s")
         self.out.add("run", "processing_s", driven.processing_s, "s")
         self.out.add("run", "peak_memory_mib", driven.peak_memory_mib, "MiB")

@@ -1,8 +1,8 @@
 """One robot's tracking in a process of its own: the protocol between it and its parent.
 
 The process opens the recording for itself, compiles, and sends `READY`. Its parent sends a start
-order; then the process sends what its task is to send. An error that a user can mend is sent in
-place of any answer, and raised in the parent. The process ends when its parent ends.
+order; then the process sends the answers of its task. An `AirgroundError` is sent in place of
+an answer, and raised in the parent. The process ends when its parent ends.
 """
 
 from __future__ import annotations
@@ -31,12 +31,14 @@ from evaluation.setup.setups import Setup
 from sim.interrupts import deaf_children, end_with_parent
 
 READY = None
+"""Answer of a process that waits for its start order."""
+
 Order = TypeVar("Order")
 
 
 @dataclass(frozen=True)
 class RobotTask:
-    """One robot's tracking, as it crosses to its process.
+    """One robot's tracking, as sent to its process.
 
     Attributes:
         recording: Folder of the recording.
@@ -52,13 +54,13 @@ class RobotTask:
 
 
 class RobotProcess(AbstractContextManager["RobotProcess"]):
-    """Starts at once and is killed when the block ends; it ignores Ctrl-C.
+    """A process that starts at once, is killed when the block ends, and ignores Ctrl-C.
 
     Processes are spawned, since threads of OpenMP do not survive a fork: each imports the main
     module anew, so a script that uses this keeps its work under `if __name__ == "__main__"`.
 
     Args:
-        robot: The robot that is tracked.
+        robot: The robot to track.
         serve: The body of the process; a function of a module.
         order: First argument of `serve`; the pipe to the parent follows.
         context: Source of processes and of memory that they share.
@@ -83,7 +85,7 @@ class RobotProcess(AbstractContextManager["RobotProcess"]):
 
     @property
     def pid(self) -> int:
-        """Number of the process."""
+        """Identifier of the process."""
         assert self._process.pid is not None
         return self._process.pid
 
@@ -92,7 +94,7 @@ class RobotProcess(AbstractContextManager["RobotProcess"]):
         return self._process.is_alive()
 
     def wait_until_ready(self) -> None:
-        """Returns when everything there is compiled, and the first image could be tracked.
+        """Return when the process has compiled and could track the first image.
 
         Raises:
             AirgroundError: The task is refused, or the process died.
@@ -100,14 +102,14 @@ class RobotProcess(AbstractContextManager["RobotProcess"]):
         self.receive()
 
     def start(self, order: object = None) -> None:
-        """Let it begin."""
+        """Send the start order."""
         self._pipe.send(order)
 
     def receive(self, or_none: bool = False) -> Any:
         """The next answer.
 
         Args:
-            or_none: Whether the answer of a process that died is None.
+            or_none: Whether a process that died gives None instead of an error.
 
         Raises:
             AirgroundError: The process could not go on, or died.
@@ -125,7 +127,7 @@ class RobotProcess(AbstractContextManager["RobotProcess"]):
         return answer
 
     def answers_within(self, seconds: float) -> bool:
-        """Whether an answer, or the end of the process, comes in this time."""
+        """Whether an answer, or the end of the process, comes within this time [s]."""
         return self._pipe.poll(seconds)
 
     def __exit__(self, *_: object) -> None:
@@ -150,7 +152,7 @@ def open_tracker(
 
     Args:
         task: The robot's task.
-        niceness: Priority that the process gives up.
+        niceness: Niceness added to that of the process.
 
     Raises:
         AirgroundError: The recording or its truth is missing or damaged.

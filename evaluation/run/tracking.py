@@ -62,8 +62,8 @@ class TrackingReport:
     Attributes:
         tracked: Answers of the front ends, by robot ("mav", "ground").
         ground: The ground robot's final trajectory; None where it has none.
-        processor_s: Processor time of processes of their own [s]; 0 in this process.
-        peak_memory_mib: Peak memory of such processes, without what they share with mapping.
+        processor_s: Processor time of separate processes [s]; 0 in this process.
+        peak_memory_mib: Peak memory of separate processes, shared memory excluded [MiB].
     """
 
     tracked: dict[str, Tracked]
@@ -73,25 +73,25 @@ class TrackingReport:
 
 
 class Tracking(Protocol):
-    """Tracks both robots. It never waits for an answer of mapping, so it may run ahead."""
+    """Tracking of both robots. It needs no answer of mapping, so it may run ahead."""
 
     def wait_until_ready(self) -> None:
-        """Returns when everything is compiled."""
+        """Return when everything is compiled."""
 
     def frames(self) -> Iterator[TrackedFrame]:
-        """Every image's frame that reaches the mapper, in order of time."""
+        """Tracked frames that reach the mapper, in order of time."""
 
     def report(self) -> TrackingReport:
-        """The outcome; to be called after the last frame."""
+        """The outcome; called after the last frame."""
 
 
 class TrackingHere:
-    """Tracks in this process.
+    """Tracking in this process.
 
     Args:
         task: Recording, front ends, seed and drops.
-        ahead: Frames that a thread of its own may track ahead of mapping. With 0 each frame is
-            tracked when it is asked for, so that no stage is timed beside other work.
+        ahead: Number of frames that a thread may track ahead of mapping. With 0, each frame is
+            tracked on request, so that no stage is timed beside other work.
     """
 
     def __init__(self, task: TrackingTask, ahead: int = 2 * FRAMES_AHEAD) -> None:
@@ -117,7 +117,7 @@ class TrackingHere:
 
 
 def front_end_rng(seed: int) -> np.random.Generator:
-    """Source of the front ends' random numbers: the same for a run and for the protocol."""
+    """Source of the front ends' random numbers, in a run and in the protocol."""
     return np.random.default_rng([seed, 0])
 
 

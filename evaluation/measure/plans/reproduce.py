@@ -10,8 +10,7 @@ from types import MappingProxyType
 
 from evaluation.measure.protocol.trials import Protocol
 from evaluation.measure.work.crew import Crew
-from evaluation.measure.work.measure import measure
-from evaluation.measure.work.recordings import recorded, recording_name
+from evaluation.measure.work.measure import measure, recorded, recording_name
 from evaluation.measure.work.unit import Finished, Unit, UnitStore, grouped
 from evaluation.setup.setups import Setup
 from evaluation.table.rows import CONTROL_SCENES, SEQUENCE_KEYS

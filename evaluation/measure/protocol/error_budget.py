@@ -1,4 +1,4 @@
-"""Error budget: the final error with each stage in turn replaced by its oracle."""
+"""Error budget: final errors with each stage in turn replaced by the truth."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from sim.recording.truth import Truth
 
 
 def with_true_surface(sighting: Sighting, truth: Truth) -> Sighting:
-    """The aerial surface is what its camera truly had before it, without a hole or an error.
+    """The aerial surface is the true one in its camera's view, without holes or errors.
 
-    It hangs on the pose that the MAV believes in: errors of poses stay.
+    It is placed by the MAV's estimated pose, so that errors of poses stay.
     """
     surface = sighting.surface
     T_world_camera = truth.T_world_mav_camera(surface.reference_stamp_ns)
@@ -42,9 +42,9 @@ def with_true_surface(sighting: Sighting, truth: Truth) -> Sighting:
 
 
 def with_true_ground_map(sighting: Sighting, truth: Truth) -> Sighting:
-    """Every point of the ground map lies on the true surface, where that is nearest.
+    """Every point of the ground map is moved to the nearest point of the true surface.
 
-    What was seen stays the same; noise, and drift across the surfaces, goes.
+    This keeps the coverage, and removes noise and drift across the surfaces.
     """
     T_world_camera = truth.T_world_ground_camera(sighting.ground_stamp_ns)
     T_world_ground = T_world_camera @ sighting.T_ground_camera.inverse()
@@ -56,13 +56,14 @@ def with_true_ground_map(sighting: Sighting, truth: Truth) -> Sighting:
 
 
 def with_true_heading(sighting: Sighting, truth: Truth) -> Sighting:
-    """The turn between the maps is known exactly."""
+    """The heading between the maps is the true one."""
     return replace(sighting, heading=true_T_ground_mav(sighting, truth).heading())
 
 
 STAGE = "budget"
+"""Stage of the rows."""
 SETTLED = 4
-"""Sightings count from this one on, when the filter has had its chance (Sec. VIII-C)."""
+"""Number of the first sighting that counts: the filter converges within 4 (Sec. VIII-C)."""
 
 
 @dataclass(frozen=True)
@@ -70,10 +71,10 @@ class StandIn:
     """One row of the budget.
 
     Attributes:
-        name: What is true.
-        poses: Where the poses come from.
+        name: Name of the true quantity.
+        poses: Source of the poses.
         change: Replaces a stage's result in a sighting; None changes nothing.
-        located: Whether refinement starts from the true relation, without particles.
+        located: Whether refinement starts from the true `T_ground_mav`, without particles.
     """
 
     name: str
@@ -105,12 +106,12 @@ def add_error_budget(
     """Write the final error of every sighting under every stand-in.
 
     Args:
-        out: Takes rows of the stage "budget"; their note names the stand-in.
-        recording: Mapped again for each kind of poses.
-        truth: The stand-ins' source.
-        setup: With poses from SLAM.
-        maps: What `setup` made of the recording.
-        seed: Of the recording and the flight; each stand-in draws the same numbers.
+        out: Receives rows of the stage "budget"; their note is the stand-in's name.
+        recording: Recording, mapped again for each source of poses.
+        truth: Source of the true quantities.
+        setup: Setup with poses from SLAM.
+        maps: Outcome of the pass under `setup`.
+        seed: Seed of the recording and number of the flight; stand-ins share random numbers.
     """
     mapped: dict[str, Maps] = {setup.poses: maps}
     for stand_in in STAND_INS:
@@ -133,7 +134,7 @@ def final_errors(
     stand_in: StandIn,
     rng: np.random.Generator,
 ) -> list[tuple[float, float]]:
-    """Error of the refined pose [m, deg] at each settled sighting; NaN where there is none."""
+    """Error of the refined pose [m, deg] at each sighting from `SETTLED` on; NaN for failures."""
     localizer = MonteCarloLocalizer(config, rng)
     errors = []
     for iteration, seen in enumerate(sightings, 1):
@@ -153,7 +154,7 @@ def final_errors(
 def _refined_error(
     sighting: Sighting, start: SE3 | None, truth: Truth, config: Config
 ) -> tuple[float, float]:
-    """Not located, or refused, is a failure."""
+    """Error of the refined pose [m, deg]; NaN if not located, or not accepted."""
     failed = (float("nan"), float("nan"))
     if start is None:
         return failed

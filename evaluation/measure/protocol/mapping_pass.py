@@ -47,7 +47,7 @@ def _by_stage() -> dict[str, list[float]]:
 
 @dataclass
 class Localized:
-    """What the pipeline made of its sightings: beliefs and alignments.
+    """Beliefs and alignments of the pipeline for its sightings.
 
     Attributes:
         beliefs: Belief after each sighting.
@@ -60,7 +60,7 @@ class Localized:
     durations_ms: dict[str, list[float]] = field(default_factory=_by_stage)
 
     def take(self, event: Event, duration_ms: float) -> None:
-        """Keep what one event after a sighting brings."""
+        """Keep the result and the duration of an event after a sighting."""
         if isinstance(event, LOCALIZATION):
             self.durations_ms[STAGE_OF[type(event)]].append(duration_ms)
         match event:
@@ -77,11 +77,11 @@ class Localized:
 
 @dataclass
 class Maps:
-    """What one pass left; an onlooker of that pass.
+    """Outcome of one pass; an onlooker of that pass.
 
     Attributes:
         sightings: One per aerial surface that could be located, in order of time.
-        depth_maps: Of each sighting, the depth maps that were fused.
+        depth_maps: Depth maps that were fused for each sighting.
         localized: The pipeline's own beliefs and alignments.
         durations_ms: Durations of the stages up to the surface, by stage [ms].
         tracked: Answers of the front ends, by robot ("mav", "ground").
@@ -101,7 +101,7 @@ class Maps:
     _of_surface: list[DepthMap] = field(default_factory=list)
 
     def see(self, seen: Seen) -> None:
-        """Keep what one event brings."""
+        """Keep the result and the duration of an event."""
         event = seen.event
         self.localized.take(event, seen.duration_ms)
         if type(event) in STAGE_OF and not isinstance(event, LOCALIZATION):
@@ -147,10 +147,10 @@ def map_recording(
 def localize_again(
     maps: Maps, recording: Recording, setup: Setup, seed: int, flight: int
 ) -> Localized:
-    """What the pipeline makes of the same sightings under a setup with the same maps.
+    """Beliefs and alignments for the same sightings under a setup with the same maps.
 
-    Its beliefs and alignments are those of a pass of its own (`map_recording`), since
-    localization does not act on the maps.
+    They equal those of a pass of its own (`map_recording`), since localization does not act on
+    the maps.
     """
     pipeline = pipeline_for(recording, setup, localizer_rng(seed, flight))
     localized = Localized()
@@ -162,10 +162,10 @@ def localize_again(
 
 @dataclass(frozen=True, eq=False)
 class GroundPass:
-    """What a ground robot mapped on its own.
+    """Map of a ground robot alone.
 
     Attributes:
-        cloud_ground: Its map at the end.
+        cloud_ground: Its final map.
         T_ground_camera: Its last camera pose.
     """
 
@@ -177,7 +177,7 @@ def map_ground(recording: Recording, truth: Truth, setup: Setup, seed: int) -> G
     """Run the pipeline over a recording without the MAV's images.
 
     Returns:
-        The ground robot's map, or None where the robot never had a pose.
+        The ground robot's map; None if the robot never had a pose.
     """
     no_aerial = DropList(
         schema=SCHEMA,

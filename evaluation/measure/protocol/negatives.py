@@ -1,4 +1,4 @@
-"""Negative cases: aerial maps with no place to find, made of a flight that was mapped already."""
+"""Negative cases: aerial maps without a place in the ground map, made from a mapped flight."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ from evaluation.table.truth_errors import PoseError, pose_error, true_T_ground_m
 from sim.recording.truth import Truth
 
 OVERLAP_LEFT = 0.10
-"""Share of the aerial points that the ground map still reaches under in `NO_OVERLAP`: a third
-of the least overlap that localization asks for."""
+"""Share of the aerial points above the ground map in `NO_OVERLAP`: a third of the least overlap
+that localization requires."""
 
 
 def add_negatives(
@@ -42,29 +42,29 @@ def add_negatives(
     seed: tuple[int, int],
     protocol: Protocol,
 ) -> None:
-    """Write what localization and refinement say where there is nothing to find.
+    """Write the results of localization and refinement in the negative cases.
 
     Args:
-        out: Takes rows of the cases' stages.
-        maps: What was mapped; the sightings of the positive sequences and trials are used.
+        out: Receives rows of the cases' stages.
+        maps: Outcome of the pass; its sightings are those of the positive sequences and trials.
         stranger: A ground robot's map of another scene; None leaves `WRONG_MAP` out.
-        truth: Cuts the overlap away, and judges where there is something to judge.
-        config: Of localization and refinement.
-        seed: Of the recording and the flight.
-        protocol: How much is tried in each case.
+        truth: Reference of the errors, and of the overlap to remove.
+        config: Configuration of localization and refinement.
+        seed: Seed of the recording and number of the flight.
+        protocol: Numbers of sequences and trials in each case.
     """
-    lost = [without_overlap(sighting, truth) for sighting in maps.sightings]
-    _add_case(out, NO_OVERLAP, lost, truth, config, seed, protocol)
+    sightings = [without_overlap(sighting, truth) for sighting in maps.sightings]
+    _add_case(out, NO_OVERLAP, sightings, truth, config, seed, protocol)
     if stranger is not None:
-        lost = [over_another_map(sighting, stranger) for sighting in maps.sightings]
-        _add_case(out, WRONG_MAP, lost, truth, config, seed, protocol)
+        sightings = [over_another_map(sighting, stranger) for sighting in maps.sightings]
+        _add_case(out, WRONG_MAP, sightings, truth, config, seed, protocol)
 
 
 def without_overlap(sighting: Sighting, truth: Truth) -> Sighting:
-    """The ground map ends before the aerial surface begins, but for `OVERLAP_LEFT` of it.
+    """A sighting whose ground map lies under only `OVERLAP_LEFT` of the aerial surface.
 
-    It is cut along a line across the aerial surface, and what lies on the side of its own
-    middle is kept: as if the robot had not driven that far yet.
+    The ground map is cut along a line across the aerial surface, and the side of the ground map's
+    centre is kept, as if the robot had not driven that far yet.
     """
     aerial = _horizontal(true_T_ground_mav(sighting, truth) @ sighting.surface.cloud_mav.points)
     cloud = sighting.ground_cloud
@@ -78,7 +78,7 @@ def without_overlap(sighting: Sighting, truth: Truth) -> Sighting:
 
 
 def over_another_map(sighting: Sighting, stranger: GroundPass) -> Sighting:
-    """The ground robot is another one, somewhere else; headings are as good as any there."""
+    """A sighting over another robot's ground map; its heading is kept."""
     return replace(
         sighting, ground_cloud=stranger.cloud_ground, T_ground_camera=stranger.T_ground_camera
     )
@@ -111,9 +111,9 @@ def _add_case(
 
 
 def refine_best_guess(sighting: Sighting, config: Config, rng: np.random.Generator) -> Alignment:
-    """Refine where localization would look first, whether it claims that place or not.
+    """Refine from the belief of localization, whether it claims a position or not.
 
-    No start is worse than the place that resembles the aerial map most.
+    No start makes a wrong alignment more likely than the place most similar to the aerial map.
     """
     localizer = MonteCarloLocalizer(config, rng)
     for _ in locate(localizer, sighting):
@@ -154,14 +154,14 @@ def _horizontal(points: NDArray) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class Case:
-    """One kind of negative.
+    """One negative case.
 
     Attributes:
-        stage: Of its rows. Metrics are `converged` and `error_m` of localizations, by sequence
-            and iteration; `accepted`, `after_translation_m` and `after_rotation_deg` of
+        stage: Stage of its rows. Metrics are `converged` and `error_m` of localizations, by
+            sequence and iteration; `accepted`, `after_translation_m` and `after_rotation_deg` of
             refinements, by trial. Without a truth there are no errors.
-        number: Seeds its draws.
-        has_truth: Whether the MAV is somewhere in the frame of the ground map, though off it.
+        number: Part of the seed of its random numbers.
+        has_truth: Whether the MAV has a true pose in the frame of the ground map.
     """
 
     stage: str

@@ -30,19 +30,19 @@ SEQUENCE_LENGTH = 12
 """Aerial maps in a sequence (Sec. VIII-C)."""
 
 START_NOISE_M, START_NOISE_DEG = 0.2, 3.0
-"""Standard deviation per axis of a refinement trial's start (Sec. VIII-D)."""
+"""Standard deviation per axis of the start of a refinement trial [m, deg] (Sec. VIII-D)."""
 
 
 @dataclass(frozen=True)
 class Protocol:
-    """How much is measured on each recording.
+    """Numbers of experiments on each recording, spread evenly over the flight.
 
     Attributes:
-        sequences: Sequences of aerial maps, spread evenly over the flight.
-        trials: Refinements from a noisy start, likewise.
-        baselines: How many of these trials every baseline is tried on as well.
-        sequence_length: Aerial maps in a sequence.
-        wide_searches: Aerial maps that are looked for one by one in a wider region.
+        sequences: Number of sequences of aerial maps.
+        trials: Number of refinements from a noisy start.
+        baselines: Number of these trials on which every baseline is measured too.
+        sequence_length: Number of aerial maps in a sequence.
+        wide_searches: Number of aerial maps that are searched for one by one in a wider region.
     """
 
     sequences: int = 7
@@ -54,12 +54,13 @@ class Protocol:
 
 @dataclass(frozen=True)
 class Iteration:
-    """One aerial map taken in by one sequence.
+    """One update of a sequence's filter with an aerial map.
 
     Attributes:
-        belief: What the filter says then.
-        error: How far off that is.
-        squared_mahalanobis: The same in its own measure (`evaluation.judge.claims`).
+        belief: Belief after the update.
+        error: Its error against the truth.
+        squared_mahalanobis: The error in the measure of the belief's covariance
+            (`evaluation.judge.claims`).
     """
 
     belief: Belief
@@ -72,10 +73,10 @@ class RefinementTrial:
     """One alignment from a noisy start.
 
     Attributes:
-        alignment: What refinement said.
-        errors: "before" of the start, "after" of the result, and "from_truth" of the result
-            when started at the truth: the bound that drift and the maps' errors set.
-        duration_ms: How long it took, preparation included.
+        alignment: Result of refinement.
+        errors: Errors of the start ("before"), of the result ("after"), and of the result when
+            started at the truth ("from_truth"): the limit set by drift and the maps' errors.
+        duration_ms: Duration, preparation included [ms].
     """
 
     alignment: Alignment
@@ -84,34 +85,35 @@ class RefinementTrial:
 
 
 def sequence_starts(sightings: int, sequences: int, length: int = SEQUENCE_LENGTH) -> list[int]:
-    """Where sequences begin: spread evenly over a flight, chosen by nothing else.
+    """Index of the first sighting of each sequence, spread evenly over a flight.
 
-    A flight with fewer aerial maps than a sequence has gives one; what it lacks counts as failed.
+    A flight with fewer aerial maps than a sequence gives one; the missing ones count as failed.
     """
     last = max(0, sightings - length)
     return sorted({round(start) for start in np.linspace(0, last, sequences)})
 
 
 def trial_sightings(sightings: int, trials: int) -> list[int]:
-    """Which sightings refinement is tried on: spread evenly, each at most once."""
+    """Indices of the sightings of refinement trials: spread evenly, each at most once."""
     return spread_evenly(sightings, min(trials, sightings))
 
 
 def spread_evenly(total: int, count: int) -> list[int]:
-    """`count` of the indices below `total`, the first and the last among them."""
+    """`count` indices below `total`, the first and the last included."""
     return [round(index) for index in np.linspace(0, total - 1, min(count, total))]
 
 
 def localize_sequence(
     sightings: Sequence[Sighting], truth: Truth, config: Config, rng: np.random.Generator
 ) -> Iterator[tuple[Event, float, Iteration | None]]:
-    """Start a new filter and feed it the sightings.
+    """Update a new filter with the sightings.
 
-    Yields every event with its time [ms], and with the iteration that it completes.
+    Yields:
+        Each event, its duration [ms], and the iteration that it completes, if any.
     """
     localizer = MonteCarloLocalizer(config, rng)
     for sighting in sightings:
-        yield from _taken_in(localizer, pair_of(sighting, config), sighting, truth)
+        yield from _update(localizer, pair_of(sighting, config), sighting, truth)
 
 
 def localize_sequences(
@@ -121,21 +123,21 @@ def localize_sequences(
     config: Config,
     filters: Mapping[int, tuple[int, np.random.Generator]],
 ) -> Iterator[tuple[int, Event, float | None, Iteration | None]]:
-    """Run sequences that overlap side by side, each as `localize_sequence` would.
+    """Run overlapping sequences together, each with the results of `localize_sequence`.
 
-    What an aerial map says by itself is computed once for all of them: with headings searched,
-    that is nearly everything.
+    Results that depend on the aerial map alone are computed once for all sequences: with a
+    searched heading, these take nearly all of the time.
 
     Args:
-        sightings: Of a flight.
-        length: Sightings in a sequence.
-        truth: Judges.
-        config: Of all filters.
-        filters: Start and source of randomness of each sequence, by its number.
+        sightings: Sightings of a flight.
+        length: Number of sightings in a sequence.
+        truth: Reference of all errors.
+        config: Configuration of all filters.
+        filters: Start and source of random numbers of each sequence, by its number.
 
     Yields:
-        The number of the sequence, and its next event; its time [ms], None where another
-        sequence had it computed; the iteration that it completes.
+        The number of the sequence, its next event, the event's duration [ms] (None if another
+        sequence computed it), and the iteration that it completes, if any.
     """
     localizers = {
         sequence: MonteCarloLocalizer(config, rng) for sequence, (_, rng) in filters.items()
@@ -144,7 +146,7 @@ def localize_sequences(
         pair, computed = pair_of(sighting, config), set[type[Event]]()
         for sequence, (start, _) in filters.items():
             if start <= index < start + length:
-                steps = _taken_in(localizers[sequence], pair, sighting, truth)
+                steps = _update(localizers[sequence], pair, sighting, truth)
                 for event, duration_ms, iteration in steps:
                     again = type(event) in computed
                     yield sequence, event, None if again else duration_ms, iteration
@@ -152,7 +154,7 @@ def localize_sequences(
                         computed.add(type(event))
 
 
-def _taken_in(
+def _update(
     localizer: MonteCarloLocalizer, pair: HeightMapPair, sighting: Sighting, truth: Truth
 ) -> Iterator[tuple[Event, float, Iteration | None]]:
     for event, duration_ms in timed(localizer.update(pair)):
@@ -165,7 +167,7 @@ def _taken_in(
 
 
 def noisy_start(T_ground_mav: SE3, T_mav_camera: SE3, rng: np.random.Generator) -> SE3:
-    """The true relation with noise on the MAV's camera pose, per axis as stated above."""
+    """The true `T_ground_mav` with noise on the MAV's camera pose (`START_NOISE_M`, `_DEG`)."""
     T_ground_camera = T_ground_mav @ T_mav_camera
     turn = SE3.from_rotation_vector(np.deg2rad(rng.normal(0, START_NOISE_DEG, 3)))
     T_noisy = SE3(
@@ -178,7 +180,7 @@ def noisy_start(T_ground_mav: SE3, T_mav_camera: SE3, rng: np.random.Generator) 
 def refine_sighting(
     sighting: Sighting, truth: Truth, config: Config, rng: np.random.Generator
 ) -> RefinementTrial:
-    """One refinement from a noisy start, and one from the truth."""
+    """Refine from a noisy start, and from the truth."""
     true = true_T_ground_mav(sighting, truth)
     start = noisy_start(true, sighting.T_mav_camera, rng)
     started = time.perf_counter()

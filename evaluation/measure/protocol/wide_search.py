@@ -1,7 +1,7 @@
-"""Finding aerial maps one by one where the robots hardly know how far apart they are.
+"""Wide search: localization of single aerial maps in a region well beyond the ground map.
 
-The search region reaches well beyond the ground map here. Most of the places in it hold little
-of the aerial map, or nothing, and a few cells resemble each other easily.
+Most places in the region overlap little with the aerial map, or not at all, and few cells are
+easily similar by chance.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from evaluation.table.truth_errors import true_T_ground_mav
 from sim.recording.truth import Truth
 
 STAGE = "wide_search"
-"""Metrics are `error_m`, `converged` and `lead`, by the aerial map's number as the trial."""
+"""Stage of the rows; metrics are `error_m`, `converged` and `lead`, trial the map's index."""
 WIDER = 2.0
-"""So many times as far around the ground robot as the pipeline would search."""
+"""Search radius as a multiple of the pipeline's: enough to reach beyond the ground map."""
 HERE_M, ELSEWHERE_M = 0.25, 0.5
-"""Places this close to the true one are the same place, and beyond this another."""
+"""Radius within which a place counts as the true one, and beyond which as another [m]."""
 WORST = 2.0
-"""Cost of heights that correlate by -1; as ZMSSD [m^2], of heights that differ by 2 m RMS."""
+"""Cost of heights with correlation -1; as ZMSSD [m^2], of heights that differ by 2 m RMS."""
 
 
 def add_wide_searches(
@@ -39,15 +39,15 @@ def add_wide_searches(
     seed: tuple[int, int],
     count: int,
 ) -> None:
-    """Write where each of some aerial maps is found, every one by a new filter.
+    """Localize single aerial maps, each with a new filter, and write the results.
 
     Args:
-        out: Takes the rows.
-        sightings: Of one flight.
-        truth: Judges.
-        config: Of the pipeline.
-        seed: Of the recording and the flight.
-        count: Maps to try, spread evenly over the flight.
+        out: Receives the rows.
+        sightings: Sightings of one flight.
+        truth: Reference of the errors.
+        config: Configuration of the pipeline.
+        seed: Seed of the recording and number of the flight.
+        count: Number of aerial maps, spread evenly over the flight.
     """
     radius_m = WIDER * config.localization.search_radius_m
     widened = with_localization(config, search_radius_m=radius_m)
@@ -65,13 +65,13 @@ def add_wide_searches(
 
 
 def lead_of(cost_map: CostMap, place: NDArray) -> float:
-    """The lowest cost elsewhere minus that at the true place, in units of the cost.
+    """Lowest cost elsewhere minus the lowest at the true place, in units of the cost.
 
-    Positive where the true place wins. Where no place has a cost, `WORST` stands for it.
+    Positive if the true place has the lowest cost. A place without a cost counts as `WORST`.
 
     Args:
-        cost_map: Of one aerial map.
-        place: (2,) the true u [m].
+        cost_map: Cost map of one aerial map.
+        place: (2,) true position u [m].
     """
     cells = np.indices(cost_map.costs.shape) / cost_map.cells_per_m
     away = np.hypot(*(cells + (cost_map.origin - place)[:, None, None]))

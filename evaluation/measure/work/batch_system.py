@@ -1,6 +1,6 @@
 """Workers as jobs of a batch system (SLURM and its like), by Dask-jobqueue.
 
-The file is what Dask-jobqueue's own configuration is, for one system, and how many jobs to ask for:
+The file has the number of jobs, and Dask-jobqueue's own configuration for one system:
 
     jobs: 8
     jobqueue:
@@ -34,18 +34,17 @@ CLASSES = {
     "moab": "MoabCluster",
     "local": "LocalCluster",
 }
-"""Systems that Dask-jobqueue knows; `local` runs the jobs here, to try a file out."""
+"""Systems that Dask-jobqueue knows; `local` runs the jobs on this machine, to test a file."""
 
-
-WORKERS_MAY_DRAW = "DASK_DISTRIBUTED__WORKER__DAEMON=False"
-"""Images are drawn by processes that a worker starts, which a daemon may not."""
+WORKERS_MAY_RENDER = "DASK_DISTRIBUTED__WORKER__DAEMON=False"
+"""A worker starts processes that render images, which a daemon may not."""
 
 NO_DASHBOARD = {"dashboard": False, "dashboard_address": "127.0.0.1:0"}
-"""Nobody is to watch from elsewhere, and two runs want no port of the same number."""
+"""No access from other machines, and a free port, so that two runs do not conflict."""
 
 
 class Jobs(BaseModel):
-    """The file, checked; what stands under the system's name is for Dask-jobqueue to check."""
+    """Contents of the file. Dask-jobqueue checks the entries of the system."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -54,10 +53,10 @@ class Jobs(BaseModel):
 
 
 def batch_cluster(file: Path) -> SpecCluster:
-    """Ask the batch system for the jobs that a file describes.
+    """Start the jobs that a file describes.
 
     Raises:
-        InputError: The file cannot be used, Dask-jobqueue is not installed, or it refuses.
+        InputError: The file is invalid, or Dask-jobqueue is not installed or fails.
     """
     jobs = read_jobs(file)
     ((system, options),) = jobs.jobqueue.items()
@@ -70,7 +69,7 @@ def batch_cluster(file: Path) -> SpecCluster:
     if options.get("cores") != options.get("processes"):
         raise InputError(f"--cluster {file}: cores and processes must be the same number")
     try:
-        python = f"env {WORKERS_MAY_DRAW} {options.pop('python', sys.executable)}"
+        python = f"env {WORKERS_MAY_RENDER} {options.pop('python', sys.executable)}"
         scheduler = {**NO_DASHBOARD, **options.pop("scheduler_options", {})}
         kind = getattr(module, CLASSES[system])
         cluster = kind(**options, python=python, scheduler_options=scheduler)
@@ -81,10 +80,10 @@ def batch_cluster(file: Path) -> SpecCluster:
 
 
 def read_jobs(file: Path) -> Jobs:
-    """Read such a file.
+    """Read the description of jobs.
 
     Raises:
-        InputError: It cannot be read, or does not say what is needed: names the entry.
+        InputError: The file cannot be read, or an entry is invalid.
     """
     try:
         jobs = Jobs.model_validate(yaml.safe_load(file.read_text(encoding="utf-8")))

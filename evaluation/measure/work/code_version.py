@@ -1,10 +1,9 @@
-"""Which code makes results: a digest of its sources.
+"""Version of the code that makes results: a digest of its sources.
 
-A result that is kept must never pass for one of other code. A revision of git would not do: it
-does not see what is not committed, and it changes with every sentence of the documentation. So
-this takes the sources themselves: all of `airground`, `sim` and `scenes`, and of `evaluation`
-only what `evaluation.measure.work.experiment`, which makes every row, imports, whatever lies
-between. A change to a figure or to a report leaves the version as it is.
+A stored result must never pass for one of other code. A git revision misses uncommitted changes,
+and changes with the documentation. The digest covers all of `airground`, `sim` and `scenes`, and
+of `evaluation` the imports of `evaluation.measure.work.experiment`, direct and indirect. A change
+to a figure or a report leaves the version unchanged.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ LIBRARIES = (
     "scipy",
     "small-gicp",
 )
-"""What computes for us: another version may round, or draw, otherwise."""
+"""Libraries that compute results: another version may round or sample differently."""
 
 
 @cache
@@ -43,7 +42,7 @@ def code_version() -> str:
 
 
 def row_sources(root: Path) -> list[Path]:
-    """Every file below `root` on which rows depend."""
+    """All files below `root` on which rows depend."""
     whole = [
         file
         for room in WHOLE_ROOMS
@@ -54,7 +53,7 @@ def row_sources(root: Path) -> list[Path]:
 
 
 def _imported_from(root: Path, module: str) -> set[Path]:
-    """The files of a module of `evaluation`, of all it imports there, and so on."""
+    """The files of a module of `evaluation`, and of its direct and indirect imports there."""
     found: set[Path] = set()
     waiting = _files(root, module)
     while waiting:
@@ -75,7 +74,7 @@ def _imports(file: Path) -> Iterator[str]:
 
 
 def _files(root: Path, name: str) -> list[Path]:
-    """What importing a dotted name reads: its packages, its module; nothing outside."""
+    """Files that importing a dotted name of `evaluation` reads; none for other names."""
     parts = name.split(".")
     if parts[0] != "evaluation":
         return []

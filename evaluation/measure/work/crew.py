@@ -1,4 +1,4 @@
-"""The processes that do the work: on this machine by default, or on any Dask cluster."""
+"""Worker processes: on this machine by default, or on any Dask cluster."""
 
 from __future__ import annotations
 
@@ -28,29 +28,30 @@ Task = TypeVar("Task")
 Outcome = TypeVar("Outcome")
 
 DEATHS = 3
-"""So many workers may die over one task before it is given up: it may be what kills them."""
+"""Worker deaths that one task may survive: after more, the task itself is taken as the cause."""
 RETRIES = 2
-"""So often a task is tried again that failed by an error which is no user's."""
+"""Further attempts at a task that failed with an error other than `InputError`."""
 CONNECT_S = 30
+"""Longest wait for a scheduler [s]."""
 SETTINGS = {
-    # Our workers draw images in processes of their own, which daemons may not have.
+    # Workers render images in processes of their own, which daemons may not start.
     "distributed.worker.daemon": False,
     "distributed.scheduler.allowed-failures": DEATHS,
-    # A compiled loop that holds a worker for minutes is no dead worker.
+    # A compiled loop can block a live worker for minutes.
     "distributed.scheduler.worker-ttl": None,
     "distributed.admin.tick.limit": "1h",
 }
 
 
 class Crew:
-    """Workers that start with the first task, and end with the block.
+    """Workers that start with the first task and end with the block.
 
     Args:
-        cluster: None for processes on this machine; `tcp://HOST:PORT` of a Dask scheduler that
-            is there; or a YAML file that describes jobs of a batch system.
-        cores: How many of this machine's they may use; a worker of a cluster uses one.
-        tasks: How many there are to do at a time, at most: no more processes are started here.
-        scratch: Folder for what they need while they work, on this machine.
+        cluster: None for processes on this machine; `tcp://HOST:PORT` of a running Dask
+            scheduler; or a YAML file that describes jobs of a batch system.
+        cores: Cores of this machine for all workers; a worker of a cluster uses one.
+        tasks: Largest number of tasks at a time, and so of processes here.
+        scratch: Folder for temporary files of the workers on this machine.
     """
 
     def __init__(self, cluster: str | None, cores: int, tasks: int, scratch: Path) -> None:
@@ -72,27 +73,27 @@ class Crew:
     ) -> None:
         try:
             self._stack.close()
-        except TimeoutError:  # on a busy machine; what was found is not lost for that
+        except TimeoutError:  # on a busy machine; the results are here already
             end_children()
 
     def share(self, tasks: int) -> int:
-        """Cores for each of so many tasks, so that few tasks do not leave cores idle."""
+        """Cores for each of `tasks` tasks, so that few tasks leave no core idle."""
         return max(1, self._cores // max(1, tasks))
 
     def outcomes(
         self, function: Callable[[Task], Outcome], tasks: Sequence[Task]
     ) -> Iterator[tuple[int, Outcome]]:
-        """What `function` makes of each task, as they are done: its index and its outcome.
+        """Index and outcome of each task, in the order in which they finish.
 
-        A worker that dies costs its task's time, for another does it again.
+        The task of a worker that dies is repeated by another.
 
         Args:
-            function: Of a module, since other processes import it.
-            tasks: What to do.
+            function: Function of a task; of a module, since other processes import it.
+            tasks: The tasks.
 
         Raises:
-            InputError: The cluster cannot be had.
-            AirgroundError: Workers keep dying over a task, or the cluster went away.
+            InputError: The cluster cannot be reached or used.
+            AirgroundError: Too many workers died over a task, or the cluster stopped.
         """
         if not tasks:
             return
@@ -103,18 +104,18 @@ class Crew:
         }
         try:
             for future, outcome in as_completed(futures, loop=client.loop, with_results=True):
-                if isinstance(outcome, CancelledError):  # so Dask says that a cluster is gone
+                if isinstance(outcome, CancelledError):  # the cluster has stopped
                     raise outcome
                 yield futures[future], outcome
-                future.release()  # so that nobody keeps what is already taken
+                future.release()  # frees the outcome in the cluster
         except KilledWorker:
             raise AirgroundError(
                 f"{DEATHS + 1} processes died over the same task, perhaps for lack of memory; "
-                "with fewer --threads less runs at a time"
+                "give fewer --threads"
             ) from None
         except (CancelledError, CommClosedError):
             raise AirgroundError(
-                "the cluster went away; run the same again: what is finished is kept"
+                "the cluster stopped; run the same command again to go on: finished units are kept"
             ) from None
 
     def _start(self) -> Client:
@@ -146,7 +147,7 @@ class Crew:
 
 
 def _joined(where: str, stack: ExitStack) -> Client:
-    """A client of a cluster that is there, or that a batch system starts."""
+    """A client of a running cluster, or of one that a batch system starts."""
     if where.endswith((".yaml", ".yml")):
         return Client(stack.enter_context(batch_cluster(Path(where))), set_as_default=False)
     if "://" not in where:
@@ -158,19 +159,19 @@ def _joined(where: str, stack: ExitStack) -> Client:
 
 
 def _check(client: Client, where: str) -> None:
-    """Whether the workers that are there can do our tasks."""
+    """Raise InputError if a worker of the cluster cannot do our tasks."""
     for address, fault in client.run(unfit).items():
         if fault is not None:
             raise InputError(f"--cluster {where}: worker {address} {fault}")
 
 
 class PreparedWorker(WorkerPlugin):
-    """Settles a worker's threads before its first task imports anything that reads them.
+    """Sets a worker's number of threads before its first task imports libraries that read it.
 
     Args:
         threads: Cores that the worker may use.
-        scratch: Where its temporary files go, so that the next run can remove those of a worker
-            that was killed; None for the machine's usual place.
+        scratch: Folder of its temporary files, from which the next run removes those of a killed
+            worker; None for the system's folder.
     """
 
     name = "airground"
@@ -180,27 +181,27 @@ class PreparedWorker(WorkerPlugin):
         self.scratch = scratch
 
     def setup(self, worker: Worker) -> None:
-        """Called by Dask in the worker."""
+        """As `WorkerPlugin.setup`; called in the worker."""
         prepare(self.threads)
-        os.environ["LP_NUM_THREADS"] = str(self.threads)  # of Mesa's software renderer
+        os.environ["LP_NUM_THREADS"] = str(self.threads)  # Mesa's software renderer
         if self.scratch is not None:
             tempfile.tempdir = self.scratch
         if threading.current_thread() is threading.main_thread():
-            signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for who started it
+            signal.signal(signal.SIGINT, signal.SIG_IGN)  # the main process handles Ctrl-C
 
     def transition(self, key: Any, start: str, finish: str, **kwargs: Any) -> None:
-        """Called by Dask as a task goes on: the next one starts with the memory of the first."""
+        """As `WorkerPlugin.transition`: returns the memory of a finished task to the system."""
         if start == "executing":
             hand_back_memory()
 
 
 def unfit(dask_worker: Worker) -> str | None:
-    """Why a worker cannot do our tasks; called in it by Dask."""
+    """Reason for which a worker cannot do our tasks, None without; called in the worker."""
     if dask_worker.state.nthreads != 1:
         return "does several tasks in one process; start workers with --nthreads 1"
     if multiprocessing.current_process().daemon:
         return (
-            "may start no processes, which draw images; "
+            "may start no processes, which render images; "
             "start workers with DASK_DISTRIBUTED__WORKER__DAEMON=False in their environment"
         )
     return None

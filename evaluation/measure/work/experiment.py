@@ -1,4 +1,4 @@
-"""All that is measured on one recording: the surface, the sequences, the refinement trials.
+"""Everything measured on one recording: surfaces, sequences, refinement trials, extras.
 
 One pass of the pipeline makes the sightings. Sequence 0 and the alignments are the pipeline's
 own. The other sequences and the refinement trials repeat its sightings: from a later start of
@@ -58,7 +58,7 @@ def measure_units(units: Sequence[Unit], renderers: int) -> list[Finished]:
 
     Args:
         units: Setups on one flight; extras are those of the first.
-        renderers: Processes that draw images on the fly.
+        renderers: Number of processes that render images on the fly.
     """
     first = units[0]
     stranger = None
@@ -83,10 +83,10 @@ def measure_units(units: Sequence[Unit], renderers: int) -> list[Finished]:
 
 @contextmanager
 def _opened(recording: Path | Flight, renderers: int) -> Iterator[Recording]:
-    """A recording from the disk, or one whose images are drawn while they are read."""
+    """A recording on disk, or one whose images are rendered when they are read."""
     if isinstance(recording, Flight):
-        with rendered(recording, renderers) as drawn:
-            yield drawn
+        with rendered(recording, renderers) as rendering:
+            yield rendering
     else:
         yield Recording.open(recording)
 
@@ -99,7 +99,7 @@ def _measured(
     stranger: GroundPass | None,
     is_first: bool,
 ) -> ResultTable:
-    """What one unit asks for; the pass is that of the first unit's setup."""
+    """The rows of one unit; the pass is that of the first unit's setup."""
     setup, seed = unit.setup, (unit.seed, unit.flight)
     config, protocol = setup.config, unit.protocol
     localized = maps.localized
@@ -124,7 +124,7 @@ def _measured(
 
 
 def _showcase(close_up: CloseUp, maps: Maps, unit: Unit) -> Showcase | None:
-    """Data of the pictures, with matches of images where the baselines are asked."""
+    """Data of the pictures, with matches of images if the baselines are measured."""
     assert maps.augmented is not None
     match = unit.baselines and unit.protocol.baselines > 0
     return close_up.showcase(maps.tracked, maps.augmented, unit.seed if match else None)
@@ -157,7 +157,7 @@ def _add_surfaces(out: RowWriter, maps: Maps, truth: Truth) -> None:
 
 
 def _add_alignments(out: RowWriter, maps: Maps, localized: Localized, truth: Truth) -> None:
-    """The pipeline's own alignments, from where its particles put each aerial map."""
+    """The pipeline's own alignments, which start from its particles."""
     found = zip(maps.sightings, localized.beliefs, localized.alignments, strict=True)
     for trial, (sighting, belief, alignment) in enumerate(found):
         if alignment is None:

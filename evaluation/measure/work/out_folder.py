@@ -1,4 +1,4 @@
-"""A folder of results that a run can go on with where an earlier one stopped."""
+"""A folder of results in which a run continues an earlier one."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ SCRATCH, RESULTS, LOCK = ".scratch", ".results", ".lock"
 
 @dataclass(frozen=True)
 class OutFolder:
-    """Where a run keeps its things.
+    """Folders of a run.
 
     Attributes:
         path: The folder itself.
-        store: Its finished units.
-        scratch: For what lives no longer than the run.
-        results: Results are written here, and moved to `path` once all are whole.
-        recordings: For those of this run alone; it need not be there.
+        store: The finished units.
+        scratch: Folder of temporary files.
+        results: Folder of results, which move to `path` when all are complete.
+        recordings: Folder of recordings made by this run; it may not exist.
     """
 
     path: Path
@@ -37,13 +37,13 @@ class OutFolder:
 
 @contextmanager
 def resumable_folder(path: Path) -> Iterator[OutFolder]:
-    """A new folder, or one that an earlier run of this kind left, whatever ended that run.
+    """A new folder, or one that an earlier run left, complete or not.
 
-    When the block ends without an error, what is in `results` replaces what `path` had of the
-    same names. Otherwise only finished units stay, and no folder where there are none.
+    When the block ends without an error, the files in `results` replace those of the same names in
+    `path`. Otherwise only finished units stay; a new folder without any is removed.
 
     Raises:
-        InputError: `path` is something else, cannot be made, or another run is using it.
+        InputError: `path` is of another kind, cannot be created, or is in use by another run.
         OSError: Writing failed; the error names a file.
     """
     new = not path.exists()
@@ -60,7 +60,7 @@ def resumable_folder(path: Path) -> Iterator[OutFolder]:
         _take(lock.fileno(), path)
         scratch, results, recordings = path / SCRATCH, path / RESULTS, path / RECORDINGS
         try:
-            # What a killed run has left behind.
+            # Left over from a killed run.
             for folder in (scratch, results, *recordings.glob(".*.partial")):
                 shutil.rmtree(folder, ignore_errors=True)
             scratch.mkdir()
@@ -69,7 +69,7 @@ def resumable_folder(path: Path) -> Iterator[OutFolder]:
             for made in sorted(results.iterdir()):
                 _replace(made, path / made.name)
         except OSError as error:
-            # A full disk is noticed while writing, when nobody remembers which file it was.
+            # An error while writing, as on a full disk, does not name the file.
             if error.errno is not None and error.filename is None:
                 raise OSError(error.errno, error.strerror, str(path)) from error
             raise
@@ -81,7 +81,7 @@ def resumable_folder(path: Path) -> Iterator[OutFolder]:
 
 
 def _take(descriptor: int, path: Path) -> None:
-    """The system lets go of the lock when this process ends, however it does."""
+    """Lock the folder; the system releases the lock when this process ends."""
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError:
@@ -95,7 +95,7 @@ def _replace(made: Path, place: Path) -> None:
 
 
 def _remove_if_unused(path: Path) -> None:
-    """Leave no folder behind in which nothing was finished."""
+    """Remove a folder without finished units."""
     left = {file.name for file in path.iterdir()}
     if left <= {LOCK, UNITS} and not any((path / UNITS).glob("*")):
         shutil.rmtree(path)

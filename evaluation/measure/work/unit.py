@@ -22,24 +22,24 @@ from evaluation.table.rows import ResultTable
 from sim.recording.rendered import Flight
 
 KEY_LENGTH = 32
-"""Hexadecimal digits of a key: 128 bits, so that no two units ever share one."""
+"""Hexadecimal digits of a key: 128 bits, so that no two units share one."""
 
 
 @dataclass(frozen=True)
 class Unit:
-    """One setup on one flight, with all that is measured there.
+    """One setup on one flight, and what is measured on it.
 
     Attributes:
-        recording: Where it is, or what it would be made from.
-        seed, flight: What it was made from; they seed the trials too.
-        setup: What is measured.
-        protocol: How much of it.
-        showcase: Whether to gather what pictures need.
-        budget: Whether to measure what each stage loses.
-        baselines: Whether to try the baselines.
-        negatives: Whether to try the cases in which there is nothing to find.
-        stranger: The recording whose ground map is the wrong one there, or what it would be made
-            from; None leaves that case out.
+        recording: Path of the recording, or the flight that is rendered on the fly.
+        seed, flight: Seed of the recording and number of its flight; they also seed the trials.
+        setup: Settings of the pipeline.
+        protocol: Numbers of sequences and trials.
+        showcase: Whether to keep the data of the pictures.
+        budget: Whether to measure the error budget.
+        baselines: Whether to measure the baselines.
+        negatives: Whether to measure the negative cases.
+        stranger: Another scene's recording, as `recording`, whose ground map is the wrong map of
+            the negative cases; None leaves that case out.
     """
 
     recording: Path | Flight
@@ -54,10 +54,10 @@ class Unit:
     stranger: Path | Flight | None = None
 
     def made_from(self) -> dict[str, Any]:
-        """Everything that its rows depend on, as JSON can hold it.
+        """Everything that the rows depend on, as JSON data.
 
         Raises:
-            InputError: The recording is not there.
+            InputError: The recording is missing.
         """
         setup = self.setup
         return {
@@ -83,7 +83,7 @@ class Unit:
 
     @property
     def has_extras(self) -> bool:
-        """Whether it asks for what is measured with the first unit of a group alone."""
+        """Whether it has measurements that only the first unit of a group may have."""
         return self.showcase or self.budget or self.baselines or self.negatives
 
     def maps_like(self, other: Unit) -> bool:
@@ -95,13 +95,13 @@ class Unit:
 
 
 def key_of(made_from: dict[str, Any]) -> str:
-    """The digest of a description, whatever the order of its entries."""
+    """Digest of a description, independent of the order of its entries."""
     text = json.dumps(made_from, sort_keys=True, separators=(",", ":"), allow_nan=False)
     return bytes_digest(text.encode())[:KEY_LENGTH]
 
 
 def grouped(units: Iterable[Unit]) -> list[list[Unit]]:
-    """Units that share their maps, together: drawing and mapping are the expensive part.
+    """Groups of units that share their maps, since rendering and mapping take most of the time.
 
     A unit with extras is the first of its group.
     """
@@ -139,11 +139,11 @@ _PARTIAL = ".partial-"
 
 @dataclass(frozen=True)
 class Finished:
-    """What was measured on a unit, or on several.
+    """Results of one unit, or of several.
 
     Attributes:
-        table: Its rows.
-        showcase: Data of the pictures, where it was asked for.
+        table: The rows.
+        showcase: Data of the pictures; None without.
     """
 
     table: ResultTable
@@ -158,11 +158,11 @@ class Finished:
 
 
 class UnitStore:
-    """Results by key: `KEY/rows.parquet`, `KEY/made_from.json`, and where asked `KEY/showcase/`.
+    """Results by key: `KEY/rows.parquet`, `KEY/made_from.json`, and optionally `KEY/showcase/`.
 
     Args:
-        folder: Where they are kept; it is made if it is not there, and what a killed run left
-            half-written in it is removed. Only one process may use it at a time.
+        folder: Folder of the store, created if missing; partial results of a killed run are
+            removed. Only one process may use it at a time.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -175,10 +175,10 @@ class UnitStore:
         return (self._folder / key).is_dir()
 
     def read(self, key: str) -> Finished:
-        """What `write` wrote.
+        """The results of a key.
 
         Raises:
-            InputError: It is damaged; names the file.
+            InputError: A file is damaged.
         """
         unit = self._folder / key
         showcase = unit / SHOWCASE
@@ -188,10 +188,10 @@ class UnitStore:
         )
 
     def write(self, key: str, made_from: dict[str, Any], finished: Finished) -> None:
-        """Keep what a unit found, for good once this returns.
+        """Store the results of a unit; they are on the disk when this returns.
 
         Raises:
-            OSError: The disk is full or the like: then nothing of it is kept.
+            OSError: Writing failed, as on a full disk; nothing is stored then.
         """
         partial = Path(tempfile.mkdtemp(prefix=_PARTIAL, dir=self._folder))
         try:
@@ -213,7 +213,7 @@ class UnitStore:
 
 
 def _flush(path: Path) -> None:
-    """Have a file or the names in a folder reach the disk."""
+    """Write a file, or the names in a folder, through to the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

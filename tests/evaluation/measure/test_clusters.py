@@ -65,7 +65,7 @@ def test_a_cluster_that_goes_away_is_told(tmp_path: Path) -> None:
         assert next(outcomes) == (0, 0.0)
         with Client(address, set_as_default=False) as other:
             other.shutdown()
-        with pytest.raises(AirgroundError, match="the cluster went away"):
+        with pytest.raises(AirgroundError, match="the cluster stopped"):
             next(outcomes)
 
 

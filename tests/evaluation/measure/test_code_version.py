@@ -1,4 +1,4 @@
-"""The version of the code: all that makes rows, and nothing that only shows them."""
+"""Version of the code: covers the sources that make rows, and none that only show rows."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def test_sources_are_followed_through_imports(tmp_path: Path) -> None:
         tmp_path,
         airground__core__a="",
         sim__b="",
-        evaluation__protocol__experiment="from evaluation.metrics import x\nimport numpy",
+        evaluation__measure__work__experiment="from evaluation.metrics import x\nimport numpy",
         evaluation__metrics="def f():\n    import evaluation.deep.deeper",
         evaluation__deep__deeper="from evaluation.measure.work.experiment import y",
         evaluation__report__page="",
@@ -44,25 +44,25 @@ def test_sources_are_followed_through_imports(tmp_path: Path) -> None:
     }
 
 
-def test_what_makes_our_rows_is_in_it_and_what_shows_them_is_not() -> None:
+def test_it_covers_what_makes_rows_and_not_what_shows_them() -> None:
     found = names(ROOT)
     for made in (
-        "protocol/trials",
-        "protocol/mapping_pass",
-        "truth/oracle",
-        "baselines/asift",
-        "protocol/error_budget",
+        "measure/protocol/trials",
+        "measure/protocol/mapping_pass",
+        "table/oracle",
+        "measure/baselines/feature_matching",
+        "measure/protocol/error_budget",
     ):
         assert f"evaluation/{made}.py" in found
     assert "scenes/tiny.toml" in found
     assert "airground/localization/particle_filter.py" in found
     for shown in (
-        "figures/style",
-        "report/page",
+        "show/figures/style",
+        "show/report/page",
         "cli",
-        "units/store",
-        "sweep/dials",
-        "statistics/intervals",
+        "measure/work/crew",
+        "measure/plans/dials",
+        "table/intervals",
     ):
         assert (ROOT / f"evaluation/{shown}.py").exists()
         assert f"evaluation/{shown}.py" not in found

@@ -15,7 +15,7 @@ from evaluation.measure.plans import reproduce as module
 from evaluation.measure.plans.reproduce import Plan, flights_over
 from evaluation.measure.protocol.trials import Protocol
 from evaluation.measure.work.crew import Crew
-from evaluation.measure.work.recordings import recording_name
+from evaluation.measure.work.measure import recording_name
 from evaluation.measure.work.unit import Finished, Unit, UnitStore
 from evaluation.setup.setups import Setup, with_companions
 from evaluation.table.rows import ResultTable, Row

@@ -15,8 +15,8 @@ from evaluation.measure.plans.reproduce import Plan
 from evaluation.measure.plans.suite import SUITES, Flights, Suite
 from evaluation.measure.protocol.trials import Protocol
 from evaluation.measure.work.crew import Crew
+from evaluation.measure.work.measure import recording_name
 from evaluation.measure.work.out_folder import resumable_folder
-from evaluation.measure.work.recordings import recording_name
 from evaluation.measure.work.unit import Finished, Unit, UnitStore
 from evaluation.setup.setups import Setup
 from evaluation.table.comparison import least_paired_p
