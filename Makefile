@@ -2,8 +2,10 @@
 PYTHON_IN_VENV := .venv/bin/python
 READY := .venv/.ready
 OUT ?= results/demo
+# Tests run in parallel, those of a file in one process; more processes need too much memory.
+PYTEST := $(PYTHON_IN_VENV) -m pytest -q --numprocesses=$(shell nproc) --maxprocesses=4 --dist=loadfile
 
-.PHONY: demo setup test test-slow check docs regression format clean
+.PHONY: demo setup test test-slow test-all test-uncompiled check docs regression format clean
 
 demo: $(READY)
 	rm -rf $(OUT)
@@ -17,10 +19,18 @@ $(READY): requirements.lock pyproject.toml scripts/setup
 	@touch $@
 
 test: $(READY)
-	$(PYTHON_IN_VENV) -m pytest -q -m "not slow"
+	$(PYTEST) -m "not slow"
 
 test-slow: $(READY)
-	$(PYTHON_IN_VENV) -m pytest -q -m slow --durations=10
+	$(PYTEST) -m slow --durations=10
+
+test-all: $(READY)
+	$(PYTEST) --durations=10
+
+# Kernels against their slow twins, as plain Python.
+test-uncompiled: $(READY)
+	NUMBA_DISABLE_JIT=1 $(PYTHON_IN_VENV) -m pytest -q -m "kernel and not slow" \
+		$$(grep -rl --include='test_*.py' mark.kernel tests)
 
 check: $(READY)
 	$(PYTHON_IN_VENV) -m ruff check .
@@ -34,10 +44,12 @@ docs: $(READY)
 	.venv/bin/sphinx-build -W --keep-going -q -b html docs results/docs
 
 # Did a change make it worse? Against evaluation/accepted.json; docs/check_a_change.md.
+# RESUME=1 uses what OUT has of the same sources; RECORDINGS=DIR keeps the recordings there.
 regression: OUT = results/regression
 regression: $(READY)
-	rm -rf $(OUT)
-	.venv/bin/airground reproduce --suite fast --render --out $(OUT)
+	$(if $(RESUME),,rm -rf $(OUT))
+	.venv/bin/airground reproduce --suite fast --out $(OUT) \
+		$(if $(RECORDINGS),--recordings $(RECORDINGS),--render)
 	.venv/bin/airground check $(OUT)
 
 format: $(READY)
