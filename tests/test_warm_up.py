@@ -12,10 +12,8 @@ from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
 from airground.localization.height_map_pair import HeightMapPair
 from airground.localization.particle_filter import MonteCarloLocalizer
-from airground.localization.warm_up import warm_up_localization
 from airground.refinement import refine
-from airground.refinement.warm_up import warm_up_refinement
-from airground.warm_up import warm_up_mapping
+from airground.warm_up import warm_up_localization, warm_up_mapping, warm_up_refinement
 from tests.compiled_kernels import compiled
 from tests.localization.synthetic import aerial_points, box_heap, ground_points
 from tests.test_pipeline import Recorded
