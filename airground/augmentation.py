@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airground.core.arrays import U8, read_only
+from airground.core.arrays import U8, freeze
 from airground.core.cloud import PointCloud, Source
 from airground.core.se3 import SE3
 from airground.core.surface import AerialSurface
@@ -27,7 +27,7 @@ class AugmentedMap:
 
     def __post_init__(self) -> None:
         n = len(self.cloud_ground)
-        object.__setattr__(self, "sources", read_only(self.sources, "sources", (n,), np.uint8))
+        freeze(self, "sources", (n,), np.uint8)
 
 
 class Augmentation:

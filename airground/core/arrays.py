@@ -55,6 +55,11 @@ def read_only(
     return view
 
 
+def freeze(owner: object, name: str, shape: Sequence[int | None], dtype: type[np.generic]) -> None:
+    """Replace an attribute of a frozen data type by its `read_only` array."""
+    object.__setattr__(owner, name, read_only(getattr(owner, name), name, shape, dtype))
+
+
 def _fits(shape: tuple[int, ...], expected: Sequence[int | None]) -> bool:
     """Whether each dimension is as long as expected, or may have any length."""
     return len(shape) == len(expected) and all(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airground.core.arrays import F32, F64, read_only
+from airground.core.arrays import F32, F64, freeze
 from airground.core.se3 import SE3
 
 
@@ -25,9 +25,8 @@ class HeightMap:
     cells_per_m: float
 
     def __post_init__(self) -> None:
-        heights = read_only(self.heights, "heights", (None, None), np.float32)
-        object.__setattr__(self, "heights", heights)
-        object.__setattr__(self, "origin", read_only(self.origin, "origin", (2,), np.float64))
+        freeze(self, "heights", (None, None), np.float32)
+        freeze(self, "origin", (2,), np.float64)
         if not self.cells_per_m > 0:
             raise ValueError(f"cells_per_m must be positive, got {self.cells_per_m}")
 
@@ -56,8 +55,8 @@ class CostMap:
     cost: str
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "costs", read_only(self.costs, "costs", (None,) * 2, np.float32))
-        object.__setattr__(self, "origin", read_only(self.origin, "origin", (2,), np.float64))
+        freeze(self, "costs", (None,) * 2, np.float32)
+        freeze(self, "origin", (2,), np.float64)
 
     def best(self) -> F64 | None:
         """(2,) the u of lowest cost [m] (Eq. 3), or None where no overlap suffices."""
@@ -95,8 +94,7 @@ class Belief:
 
     def __post_init__(self) -> None:
         for name, shape in (("particles", (None, 3)), ("estimate", (3,)), ("covariance", (2, 2))):
-            array = read_only(getattr(self, name), name, shape, np.float64)
-            object.__setattr__(self, name, array)
+            freeze(self, name, shape, np.float64)
 
     @property
     def spread_m(self) -> float:

@@ -7,7 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from airground.core.arrays import F32, U8, read_only
+from airground.core.arrays import F32, U8, freeze, read_only
 
 
 class Source(IntEnum):
@@ -36,11 +36,9 @@ class PointCloud:
         if not np.isfinite(points).all():
             raise ValueError("points: every coordinate must be finite")
         object.__setattr__(self, "points", points)
-        colours = read_only(self.colours, "colours", (len(points), 3), np.uint8)
-        object.__setattr__(self, "colours", colours)
+        freeze(self, "colours", (len(points), 3), np.uint8)
         if self.normals is not None:
-            normals = read_only(self.normals, "normals", (len(points), 3), np.float32)
-            object.__setattr__(self, "normals", normals)
+            freeze(self, "normals", (len(points), 3), np.float32)
 
     def __len__(self) -> int:
         return len(self.points)

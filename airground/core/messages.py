@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airground.core.arrays import F32, F64, I64, U8, read_only
+from airground.core.arrays import F32, F64, I64, U8, freeze
 from airground.core.camera import PinholeCamera
 from airground.core.cloud import Source
 from airground.core.se3 import SE3
@@ -25,7 +25,7 @@ class MavImage:
     image: U8
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "image", read_only(self.image, "image", (None, None), np.uint8))
+        freeze(self, "image", (None, None), np.uint8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +43,8 @@ class GroundImage:
     depth: F32
 
     def __post_init__(self) -> None:
-        colour = read_only(self.colour, "colour", (None, None, 3), np.uint8)
-        depth = read_only(self.depth, "depth", colour.shape[:2], np.float32)
-        object.__setattr__(self, "colour", colour)
-        object.__setattr__(self, "depth", depth)
+        freeze(self, "colour", (None, None, 3), np.uint8)
+        freeze(self, "depth", self.colour.shape[:2], np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,17 +62,11 @@ class ImuSamples:
     accelerometer: F64
 
     def __post_init__(self) -> None:
-        stamps = read_only(self.stamps_ns, "stamps_ns", (None,), np.int64)
-        n = len(stamps)
-        if (np.diff(stamps) <= 0).any():
+        freeze(self, "stamps_ns", (None,), np.int64)
+        if (np.diff(self.stamps_ns) <= 0).any():
             raise ValueError("stamps_ns must strictly increase")
-        object.__setattr__(self, "stamps_ns", stamps)
-        object.__setattr__(self, "gyro", read_only(self.gyro, "gyro", (n, 3), np.float64))
-        object.__setattr__(
-            self,
-            "accelerometer",
-            read_only(self.accelerometer, "accelerometer", (n, 3), np.float64),
-        )
+        for name in ("gyro", "accelerometer"):
+            freeze(self, name, (len(self.stamps_ns), 3), np.float64)
 
     def between(self, start_ns: int, end_ns: int) -> ImuSamples:
         """The samples with start_ns < stamp <= end_ns."""
@@ -95,13 +87,10 @@ class MagneticSamples:
     field: F64
 
     def __post_init__(self) -> None:
-        stamps = read_only(self.stamps_ns, "stamps_ns", (None,), np.int64)
-        if (np.diff(stamps) <= 0).any():
+        freeze(self, "stamps_ns", (None,), np.int64)
+        if (np.diff(self.stamps_ns) <= 0).any():
             raise ValueError("stamps_ns must strictly increase")
-        object.__setattr__(self, "stamps_ns", stamps)
-        object.__setattr__(
-            self, "field", read_only(self.field, "field", (len(stamps), 3), np.float64)
-        )
+        freeze(self, "field", (len(self.stamps_ns), 3), np.float64)
 
     def between(self, start_ns: int, end_ns: int) -> MagneticSamples:
         """The samples with start_ns < stamp <= end_ns."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airground.core.arrays import F32, U8, read_only
+from airground.core.arrays import F32, U8, freeze
 from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
@@ -34,8 +34,8 @@ class DepthMap:
 
     def __post_init__(self) -> None:
         shape = (self.camera.height, self.camera.width)
-        object.__setattr__(self, "depth", read_only(self.depth, "depth", shape, np.float32))
-        object.__setattr__(self, "image", read_only(self.image, "image", shape, np.uint8))
+        freeze(self, "depth", shape, np.float32)
+        freeze(self, "image", shape, np.uint8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,4 +62,4 @@ class AerialSurface:
 
     def __post_init__(self) -> None:
         shape = (self.camera.height, self.camera.width)
-        object.__setattr__(self, "depth", read_only(self.depth, "depth", shape, np.float32))
+        freeze(self, "depth", shape, np.float32)

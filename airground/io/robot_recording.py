@@ -13,7 +13,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from airground.core.arrays import I64, read_only
+from airground.core.arrays import I64, freeze
 from airground.core.cloud import Source
 from airground.core.messages import (
     GroundImage,
@@ -93,8 +93,7 @@ class RobotRecording(Generic[Image]):
     T_pose_camera: SE3
 
     def __post_init__(self) -> None:
-        stamps = read_only(self.camera_stamps, "camera_stamps", (None,), np.int64)
-        object.__setattr__(self, "camera_stamps", stamps)
+        freeze(self, "camera_stamps", (None,), np.int64)
 
     @property
     def duration_s(self) -> float:

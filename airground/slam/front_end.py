@@ -12,7 +12,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from airground.core.arrays import F32, F64, Mask, read_only
+from airground.core.arrays import F32, F64, Mask, freeze
 from airground.core.messages import GroundImage, ImuSamples, MavImage
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
@@ -52,9 +52,8 @@ class TrackedCorners:
     mapped: Mask
 
     def __post_init__(self) -> None:
-        pixels = read_only(self.pixels, "pixels", (None, 2), np.float32)
-        object.__setattr__(self, "pixels", pixels)
-        object.__setattr__(self, "mapped", read_only(self.mapped, "mapped", (len(pixels),), bool))
+        freeze(self, "pixels", (None, 2), np.float32)
+        freeze(self, "mapped", (len(self.pixels),), np.bool_)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +89,7 @@ class TrackedPose:
         if (self.tracking is Tracking.TRACKED) != (self.T_map_camera is not None):
             raise ValueError("a pose is there exactly when the image was tracked")
         if self.covariance is not None:
-            covariance = read_only(self.covariance, "covariance", (6, 6), np.float64)
-            object.__setattr__(self, "covariance", covariance)
+            freeze(self, "covariance", (6, 6), np.float64)
 
 
 Image_contra = TypeVar("Image_contra", MavImage, GroundImage, contravariant=True)

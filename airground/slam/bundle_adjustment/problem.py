@@ -8,7 +8,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from airground.core.arrays import F64, I64, Mask, read_only
+from airground.core.arrays import F64, I64, Mask, freeze, read_only
 from airground.slam.inertial.preintegration import Preintegration
 
 
@@ -53,8 +53,7 @@ class States:
                 raise ValueError(f"{name}: keyframe {_first_bad(array)} is not finite")
             object.__setattr__(self, name, array)
         if self.still is not None:
-            still = read_only(self.still, "still", (len(rotations),), np.bool_)
-            object.__setattr__(self, "still", still)
+            freeze(self, "still", (len(rotations),), np.bool_)
 
     def __len__(self) -> int:
         return len(self.rotations)
@@ -85,13 +84,12 @@ class Observations:
     def __post_init__(self) -> None:
         m = len(self.keyframes)
         for name in ("keyframes", "points"):
-            object.__setattr__(self, name, read_only(getattr(self, name), name, (m,), np.int64))
-        pixels = read_only(self.pixels, "pixels", (m, 2), np.float64)
-        object.__setattr__(self, "pixels", pixels)
+            freeze(self, name, (m,), np.int64)
+        freeze(self, "pixels", (m, 2), np.float64)
         for name in ("sigmas_px", "inverse_depths", "inverse_depth_sigmas"):
-            object.__setattr__(self, name, read_only(getattr(self, name), name, (m,), np.float64))
-        if not np.isfinite(pixels).all():
-            raise ValueError(f"pixels: observation {_first_bad(pixels)} is not finite")
+            freeze(self, name, (m,), np.float64)
+        if not np.isfinite(self.pixels).all():
+            raise ValueError(f"pixels: observation {_first_bad(self.pixels)} is not finite")
         if not (self.sigmas_px > 0).all():
             raise ValueError("sigmas_px must be positive")
         if not ((self.inverse_depth_sigmas > 0) | np.isnan(self.inverse_depths)).all():
@@ -162,13 +160,10 @@ class Adjustment:
     covariance: F64 | None
 
     def __post_init__(self) -> None:
-        points = read_only(self.points, "points", (None, 3), np.float64)
-        object.__setattr__(self, "points", points)
-        residuals_px = read_only(self.residuals_px, "residuals_px", (None,), np.float64)
-        object.__setattr__(self, "residuals_px", residuals_px)
+        freeze(self, "points", (None, 3), np.float64)
+        freeze(self, "residuals_px", (None,), np.float64)
         if self.covariance is not None:
-            covariance = read_only(self.covariance, "covariance", (6, 6), np.float64)
-            object.__setattr__(self, "covariance", covariance)
+            freeze(self, "covariance", (6, 6), np.float64)
 
 
 def check(

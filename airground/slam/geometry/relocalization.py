@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from airground.core.arrays import F64, I64, U8, U64, Floats, read_only
+from airground.core.arrays import F64, I64, U8, U64, Floats, freeze
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3, nearest_rotation
 from airground.slam.corners import detect_corners
@@ -46,10 +46,8 @@ class Matches:
     pixels: F64
 
     def __post_init__(self) -> None:
-        point_ids = read_only(self.point_ids, "point_ids", (None,), np.int64)
-        object.__setattr__(self, "point_ids", point_ids)
-        pixels = read_only(self.pixels, "pixels", (len(point_ids), 2), np.float64)
-        object.__setattr__(self, "pixels", pixels)
+        freeze(self, "point_ids", (None,), np.int64)
+        freeze(self, "pixels", (len(self.point_ids), 2), np.float64)
 
 
 @dataclass(frozen=True, eq=False)

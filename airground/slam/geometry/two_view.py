@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airground.core.arrays import F64, Mask, read_only
+from airground.core.arrays import F64, Mask, freeze
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3, nearest_rotation, rotation_angle
 from airground.slam.geometry.epipolar import direction_by_two_rays, refine
@@ -60,10 +60,8 @@ class TwoViewStart:
     reason: str
 
     def __post_init__(self) -> None:
-        points = read_only(self.points_a, "points_a", (None, 3), np.float64)
-        object.__setattr__(self, "points_a", points)
-        inliers = read_only(self.inliers, "inliers", (len(points),), np.bool_)
-        object.__setattr__(self, "inliers", inliers)
+        freeze(self, "points_a", (None, 3), np.float64)
+        freeze(self, "inliers", (len(self.points_a),), np.bool_)
 
 
 @dataclass(frozen=True, eq=False)
