@@ -1,4 +1,4 @@
-"""The examples of docs/python_api.md, as they stand there."""
+"""The examples of docs/python_api.md and docs/add_a_front_end.md, as they stand there."""
 
 from __future__ import annotations
 
@@ -20,8 +20,16 @@ from airground.core.cloud import PointCloud
 from airground.io.ply import read_ply
 from airground.io.recording import Recording
 
-PAGE = Path(__file__).parents[2] / "docs" / "python_api.md"
-EXAMPLES = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+def examples_of(page: str) -> list[str]:
+    text = (DOCS / page).read_text(encoding="utf-8")
+    return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+
+
+EXAMPLES = examples_of("python_api.md")
+FRONT_END, _, PIPELINE = examples_of("add_a_front_end.md")
 
 
 @pytest.fixture
@@ -40,7 +48,7 @@ def names_after(example: str) -> dict[str, Any]:
 
 
 def test_every_example_needs_two_import_lines_at_most() -> None:
-    for example in EXAMPLES:
+    for example in (*EXAMPLES, FRONT_END, PIPELINE):
         imports = [line for line in example.splitlines() if line.startswith(("import", "from"))]
         assert len(imports) <= 2, example
 
@@ -92,3 +100,12 @@ def test_the_package_alone_loads_nothing_heavy() -> None:
     code = f"import airground, sys; print(sorted({heavy} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_a_front_end_of_your_own_runs_in_the_pipeline(here: None) -> None:
+    names = names_after(FRONT_END + PIPELINE)
+    tracked = [airground.MavTracked, airground.GroundTracked]
+    images = [len(names["robots"].of(robot).camera_stamps) for robot in airground.Source]
+    counts = [sum(isinstance(event, kind) for event in names["events"]) for kind in tracked]
+    assert sorted(counts) == sorted(images)
+    assert names["trackers"].finish() is not None
