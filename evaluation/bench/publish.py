@@ -9,13 +9,11 @@ import sys
 from pathlib import Path
 
 from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from airground.errors import InputError
 from evaluation.bench.picture import bench_figure, cores, curves_figure, milliseconds
 from evaluation.bench.report import KIND, BenchReport, CurveResult, LaneTiming, RowResult
-from evaluation.setup import console
+from evaluation.setup import console, text
 from evaluation.setup.checked_json import read_checked
 from evaluation.show.figures.style import PICTURE_DPI
 from evaluation.show.report.screen import live_rows
@@ -29,14 +27,10 @@ END = "<!-- what airground bench found: end -->"
 
 def print_table(report: BenchReport, screen: Console) -> None:
     """Print the results and the conditions of the measurement."""
-    # Square brackets are units here, no markup.
-    shown = Table(title=Text("median, 95 % (calls) [ms]; the paper: Table I"), title_justify="left")
-    for index, title in enumerate(header(report)):
-        left = index == 0 or title == "peer"
-        shown.add_column(Text(title), justify="left" if left else "right", overflow="fold")
-    for words in body(report):
-        shown.add_row(*map(Text, words))
-    screen.print(shown)
+    titles = header(report)
+    table = text.TextTable(tuple(titles), tuple(map(tuple, body(report))))
+    title = "median, 95 % (calls) [ms]; the paper: Table I"
+    text.print_table(table, title, console=screen, left=(0, titles.index("peer")))
     growth = (
         f"{title} over {parameter}: power {power}, of processor time {cpu_power} ({points} ms)"
         for title, parameter, power, cpu_power, points in map(_curve, report.curves)

@@ -9,8 +9,8 @@ from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import Console
-from rich.table import Table
+
+from evaluation.setup.text import TextTable, print_table
 
 
 class Verdict(StrEnum):
@@ -40,14 +40,11 @@ class Finding:
 
 def show(title: str, findings: Sequence[Finding]) -> None:
     """Print findings as a table."""
-    colours = {Verdict.FINE: "green", Verdict.NOTED: "yellow", Verdict.WRONG: "bold red"}
-    shown = Table(title=title, title_justify="left")
-    for header in ("", "what", "found", ""):
-        shown.add_column(header)
-    for one in findings:
-        colour = colours[one.verdict]
-        shown.add_row(one.part, one.subject, one.found, f"[{colour}]{one.verdict}[/]")
-    Console().print(shown)
+    colours = {Verdict.FINE: "", Verdict.NOTED: "yellow", Verdict.WRONG: "bold red"}
+    rows = tuple((one.part, one.subject, one.found, str(one.verdict)) for one in findings)
+    styles = [colours[one.verdict] for one in findings]
+    table = TextTable(("", "what", "found", ""), rows)
+    print_table(table, title, left=range(4), styles=styles)
 
 
 def as_json(dataset: str, layout: str, findings: Sequence[Finding]) -> str:

@@ -13,6 +13,7 @@ from evaluation.setup import published
 from evaluation.show.figures.boxes import TITLE_PAD_PT, draw_boxes, iteration_axis, log_axis
 from evaluation.show.figures.style import LABEL_PT, PAPER, SERIES, WIDE_IN, reference_line, styled
 from evaluation.table.intervals import rate_within
+from evaluation.table.limits import FIRST_MAP, FOURTH_MAP, LOCATED_M, NEAR_M
 
 PerSequence = dict[str, NDArray[np.float64]]
 """Label of a condition -> (sequences, iterations) values [m], NaN or inf for a failure."""
@@ -27,14 +28,14 @@ def localization_error_figure(errors: PerSequence, colours: Sequence[str] = SERI
     ).values()
     log_axis(boxes, list(errors.values()), floor=1e-3)
     boxes.set_ylim(top=max(boxes.get_ylim()[1], 0.65))
-    for limit in (0.5, 0.25):
+    for limit in (NEAR_M, LOCATED_M):
         reference_line(boxes, limit, f"{limit:g} m")
     title = "error of the MAV's position relative to the ground robot [m]"
     _boxes_over_iterations(boxes, errors, colours, title)
     figure.legend(loc="outside upper left")
 
-    _success(near, errors, colours, 0.5, published.WITHIN_0_50_M_FIRST.value, at=1)
-    _success(close, errors, colours, 0.25, published.WITHIN_0_25_M_FOURTH.value, at=4)
+    _success(near, errors, colours, NEAR_M, published.WITHIN_0_50_M_FIRST.value, at=FIRST_MAP)
+    _success(close, errors, colours, LOCATED_M, published.WITHIN_0_25_M_FOURTH.value, at=FOURTH_MAP)
     return figure
 
 
