@@ -26,7 +26,7 @@ def images_in_flight(motion_stamps_ns: np.ndarray, first_ns: int) -> np.ndarray:
 
 @pytest.fixture(scope="session")
 def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A recording with nominal sensors; nobody may change it."""
+    """A recording with nominal sensors, shared by all tests: read only."""
     out = tmp_path_factory.mktemp("small") / "recording"
     scene = parse_scene(SCENE, "small.toml")
     with pytest.MonkeyPatch.context() as patch:

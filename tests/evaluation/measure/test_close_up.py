@@ -1,4 +1,4 @@
-"""What a run keeps for its pictures, and the gallery that is drawn from it."""
+"""Data for pictures gathered in a run, and the gallery drawn from it."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def test_later_maps_are_not_kept() -> None:
     assert len(showcase.depth_maps) == 1
 
 
-def test_costs_that_the_filter_did_without_are_computed_for_the_picture() -> None:
+def test_costs_that_the_filter_did_not_compute_are_computed_for_the_picture() -> None:
     watcher = close_up()
     events = [seen for seen in seen_events() if not isinstance(seen.event, CostMapComputed)]
     heights = [seen for seen in events if type(seen.event).__name__ == "HeightMapsMade"]

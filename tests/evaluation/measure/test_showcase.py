@@ -1,4 +1,4 @@
-"""A showcase survives the disk, and its pictures show what is where."""
+"""A showcase is read back as written, and its pictures show each thing at its place."""
 
 import dataclasses
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The laws that drawing keeps: rates, thinning, grids in metres, colours."""
+"""Properties of drawing: rates, thinning, grids in metres, colours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every stream of a run, read back from its file and held against the events."""
+"""Every stream of a run, read back from its file and compared with the events."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ TRUE = {
 @pytest.fixture(scope="module")
 def read(tmp_path_factory: pytest.TempPathFactory) -> ReadBack:
     with warnings.catch_warnings():
-        warnings.simplefilter("error")  # rerun warns of what it cannot take, and goes on
+        warnings.simplefilter("error")  # rerun only warns of values that it cannot store
         return ReadBack(written(tmp_path_factory.mktemp("run") / "run.rrd"))
 
 
@@ -83,7 +83,7 @@ def test_there_is_one_timeline_and_it_is_sensor_time(read: ReadBack) -> None:
     assert read.stamps_ns("/mav/camera") == [2 * SECOND, 3 * SECOND]
 
 
-def test_without_truth_no_panel_waits_for_it() -> None:
+def test_without_truth_there_is_no_panel_for_it() -> None:
     every, rest = set(origins(layout(with_truth=True))), set(origins(layout(with_truth=False)))
     assert rest == {origin for origin in every if not origin.startswith("/truth")}
     assert "/truth/depth_error" in every
@@ -100,12 +100,12 @@ def origins(shown: Any) -> Iterator[str]:
 
 
 def test_without_truth_the_rest_is_the_same(read: ReadBack, tmp_path: Path) -> None:
-    untold = ReadBack(written(tmp_path / "run.rrd", truth=None))
-    assert untold.entities == {name for name in read.entities if not name.startswith("/truth")}
-    assert untold.values("/events", "TextLog:text") == read.values("/events", "TextLog:text")
+    plain = ReadBack(written(tmp_path / "run.rrd", truth=None))
+    assert plain.entities == {name for name in read.entities if not name.startswith("/truth")}
+    assert plain.values("/events", "TextLog:text") == read.values("/events", "TextLog:text")
 
 
-def test_cameras_are_where_the_front_ends_said(read: ReadBack) -> None:
+def test_cameras_have_the_poses_of_the_front_ends(read: ReadBack) -> None:
     assert_same(pose(read, "/mav/camera"), DOWN)
     assert read.values("/mav/camera", "Transform3D:parent_frame")[-1] == ["mav"]
     assert read.values("/mav/camera", "Transform3D:child_frame")[-1] == ["mav_camera"]
@@ -123,7 +123,7 @@ def test_images_and_corners_are_as_seen(read: ReadBack) -> None:
     assert np.abs(colour.reshape(-1, 3).mean(axis=0) - (200, 40, 40)).max() < 3
     drawn = read.values("/mav/camera/image/corners", "Points2D:positions")
     np.testing.assert_allclose(drawn[0], CORNERS + 0.5)
-    assert drawn[-1] == []  # lost: nothing is followed any more
+    assert drawn[-1] == []  # lost: no corners are tracked
     colours = read.values("/mav/camera/image/corners", "Points2D:colors")[0]
     assert colours[0] == colours[2] != colours[1]
     assert read.values("/curves/corners/mav", "Scalars:scalars")[0] == [MAPPED.sum()]
@@ -204,7 +204,7 @@ def test_curves_hold_what_was_measured(read: ReadBack) -> None:
     assert last("/truth/error/rotation_deg/refined") == pytest.approx(0.0, abs=1e-5)
 
 
-def test_what_happened_is_said_once(read: ReadBack) -> None:
+def test_each_message_appears_once(read: ReadBack) -> None:
     said = [text[0] for text in read.values("/events", "TextLog:text")]
     assert said == [
         "ground robot: has no map yet",
