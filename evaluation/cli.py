@@ -139,8 +139,20 @@ def parse(name: str, words: Sequence[str]) -> Verb:
             )
     except SystemExit as exit_:
         if exit_.code not in (None, 0):
-            console.print_error(f"{_first_part(complaint.getvalue())} (see {program} --help)")
+            said = _first_part(complaint.getvalue())
+            console.print_error(f"{_missing(name, said) or said} (see {program} --help)")
         raise
+
+
+def _missing(name: str, said: str) -> str:
+    """Tyro's message about missing options, without their help; empty for other messages."""
+    from evaluation.commands.help import grouped_options
+
+    if not said.startswith("Missing from"):
+        return ""
+    options = [one for group in grouped_options(verb_class(name)).values() for one in group]
+    forms = [one.form for one in options if one.required and one.form.split()[0] in said.split()]
+    return f"missing: {', '.join(forms)}" if forms else ""
 
 
 def _first_part(box: str) -> str:
