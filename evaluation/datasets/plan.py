@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict
 
 from airground import __version__
 from airground.errors import InputError
 from airground.io.digests import bytes_digest
+from evaluation.setup.checked_json import Part
 from sim.scene import load_scene
 from sim.sensors.presets import sensor_preset
 
@@ -21,7 +21,7 @@ MAX_SEEDS = 100_000
 """Seeds in one range: more are a typing error."""
 
 
-class World(BaseModel):
+class World(Part):
     """One recording of a dataset.
 
     Attributes:
@@ -32,7 +32,6 @@ class World(BaseModel):
         part: Part of the dataset.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     scene: str
     name: str
     digest: str
@@ -45,7 +44,7 @@ class World(BaseModel):
         return f"{self.part}/{self.name}_s{self.seed}"
 
 
-class Plan(BaseModel):
+class Plan(Part):
     """All that determines the contents of a dataset.
 
     Attributes:
@@ -55,7 +54,6 @@ class Plan(BaseModel):
         worlds: The recordings.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
     airground: str = __version__
     sensors: str
     duration_s: float | None
