@@ -26,11 +26,9 @@ from evaluation.run.robot_process import READY, RobotProcess, RobotTask, open_tr
 from evaluation.run.tracking import FRAMES_AHEAD, TrackingReport, TrackingTask
 from evaluation.setup.environment import settle
 from evaluation.setup.memory import files_mib, peak_memory_mib
-from evaluation.table.tracking_log import Tracked
 
 NICENESS = 10
 """Niceness of the processes: mapping takes longer than tracking, so that it goes first."""
-
 
 PIXEL_BYTES = {Source.MAV: 1, Source.GROUND: 3 + 4}
 """Size of a pixel [bytes]: grey; colour and depth."""
@@ -127,24 +125,6 @@ class _Order:
     ring: FrameRing
 
 
-@dataclass(frozen=True)
-class _Report:
-    """Outcome of one robot's tracking.
-
-    Attributes:
-        tracked: Answers of its front end.
-        path: Its final trajectory; None where it has none.
-        processor_s: Processor time of the process [s].
-        peak_memory_mib: Peak memory of the process, without what it shares with mapping: frames
-            under way, and libraries [MiB].
-    """
-
-    tracked: Tracked
-    path: Trajectory | None
-    processor_s: float
-    peak_memory_mib: float
-
-
 class TrackingApart(AbstractContextManager["TrackingApart"]):
     """Tracks each robot in a process that ends with the block (see `RobotProcess`).
 
@@ -204,19 +184,19 @@ class TrackingApart(AbstractContextManager["TrackingApart"]):
 
     def report(self) -> TrackingReport:
         """As `Tracking.report`; raises as `frames` does."""
-        reports: dict[Source, _Report] = {
+        reports: dict[Source, TrackingReport] = {
             robot: process.receive() for robot, process in self._processes.items()
         }
         return TrackingReport(
-            {report.tracked.robot: report.tracked for report in reports.values()},
-            reports[Source.GROUND].path,
+            {name: one for report in reports.values() for name, one in report.tracked.items()},
+            reports[Source.GROUND].ground,
             sum(report.processor_s for report in reports.values()),
             sum(report.peak_memory_mib for report in reports.values()),
         )
 
 
 def _track(order: _Order, pipe: Connection) -> None:
-    """Body of the process: a frame for each image, `READY`, and the report."""
+    """Body of the process: sends a frame for each image, `READY`, and one robot's report."""
     task, ring = order.task, order.ring
     recording, watched, tracker = open_tracker(task, NICENESS)
     settle()
@@ -230,5 +210,8 @@ def _track(order: _Order, pipe: Connection) -> None:
     pipe.send(READY)
     path = tracker.finish()
     processor_s = time.process_time() - started_s
+    # Without the memory that both processes share: frames under way, and libraries.
     memory_mib = peak_memory_mib() - ring.memory_mib - files_mib()
-    pipe.send(_Report(watched.tracked_by(task.robot), path, processor_s, memory_mib))
+    tracked = watched.tracked_by(task.robot)
+    ground = path if task.robot == Source.GROUND else None
+    pipe.send(TrackingReport({tracked.robot: tracked}, ground, processor_s, memory_mib))

@@ -16,8 +16,8 @@ from airground.core.sighting import Sighting
 from airground.io.recording import Recording
 from airground.localization.particle_filter import MonteCarloLocalizer
 from airground.pipeline import locate
-from airground.refinement import refine
 from evaluation.measure.protocol.mapping_pass import Maps, map_recording
+from evaluation.measure.protocol.trials import refined
 from evaluation.setup.setups import Poses, Setup
 from evaluation.table.row_writer import RowWriter
 from evaluation.table.truth_errors import pose_error, true_T_ground_mav
@@ -121,10 +121,9 @@ def add_error_budget(
         sightings = mapped[stand_in.poses].sightings
         rng = np.random.default_rng([*seed, 4])
         for trial, error in enumerate(final_errors(sightings, truth, setup.config, stand_in, rng)):
-            for metric, value, unit in zip(
-                ("translation_m", "rotation_deg"), error, ("m", "deg"), strict=True
-            ):
-                out.add(STAGE, metric, value, unit, trial=trial, note=stand_in.name)
+            translation_m, rotation_deg = error
+            out.add(STAGE, "translation_m", translation_m, "m", trial=trial, note=stand_in.name)
+            out.add(STAGE, "rotation_deg", rotation_deg, "deg", trial=trial, note=stand_in.name)
 
 
 def final_errors(
@@ -158,8 +157,7 @@ def _refined_error(
     failed = (float("nan"), float("nan"))
     if start is None:
         return failed
-    surface = sighting.surface
-    aligned = refine(surface.stamp_ns, start, surface.cloud_mav, sighting.ground_cloud, config)
+    aligned = refined(sighting, start, config)
     if not aligned.accepted:
         return failed
     error = pose_error(aligned.T_ground_mav, sighting, truth)

@@ -15,12 +15,12 @@ from airground.core.cloud import PointCloud
 from airground.core.sighting import Sighting
 from airground.localization.particle_filter import MonteCarloLocalizer
 from airground.pipeline import locate
-from airground.refinement import refine
 from evaluation.measure.protocol.mapping_pass import GroundPass, Maps
 from evaluation.measure.protocol.trials import (
     Iteration,
     Protocol,
     localize_sequences,
+    refined,
     sequence_starts,
     trial_sightings,
 )
@@ -119,8 +119,7 @@ def refine_best_guess(sighting: Sighting, config: Config, rng: np.random.Generat
     for _ in locate(localizer, sighting):
         pass
     assert localizer.belief is not None
-    surface, start = sighting.surface, localizer.belief.T_ground_mav
-    return refine(surface.stamp_ns, start, surface.cloud_mav, sighting.ground_cloud, config)
+    return refined(sighting, localizer.belief.T_ground_mav, config)
 
 
 def _add_belief(out: RowWriter, case: Case, step: Iteration, sequence: int, iteration: int) -> None:

@@ -67,6 +67,12 @@ class Iteration:
     error: PoseError
     squared_mahalanobis: float
 
+    @classmethod
+    def of(cls, belief: Belief, sighting: Sighting, truth: Truth) -> Iteration:
+        """A belief with its errors."""
+        error = pose_error(belief.T_ground_mav, sighting, truth)
+        return cls(belief, error, squared_mahalanobis(belief, sighting, truth))
+
 
 @dataclass(frozen=True)
 class RefinementTrial:
@@ -160,9 +166,7 @@ def _update(
     for event, duration_ms in timed(localizer.update(pair)):
         iteration = None
         if isinstance(event, BeliefUpdated):
-            error = pose_error(event.belief.T_ground_mav, sighting, truth)
-            distance = squared_mahalanobis(event.belief, sighting, truth)
-            iteration = Iteration(event.belief, error, distance)
+            iteration = Iteration.of(event.belief, sighting, truth)
         yield event, duration_ms, iteration
 
 
@@ -184,17 +188,18 @@ def refine_sighting(
     true = true_T_ground_mav(sighting, truth)
     start = noisy_start(true, sighting.T_mav_camera, rng)
     started = time.perf_counter()
-    alignment = _refined(sighting, start, config)
+    alignment = refined(sighting, start, config)
     duration_ms = (time.perf_counter() - started) * 1e3
     poses = {
         "before": start,
         "after": alignment.T_ground_mav,
-        "from_truth": _refined(sighting, true, config).T_ground_mav,
+        "from_truth": refined(sighting, true, config).T_ground_mav,
     }
     errors = {when: pose_error(pose, sighting, truth) for when, pose in poses.items()}
     return RefinementTrial(alignment, errors, duration_ms)
 
 
-def _refined(sighting: Sighting, start: SE3, config: Config) -> Alignment:
+def refined(sighting: Sighting, start: SE3, config: Config) -> Alignment:
+    """Alignment of a sighting's two maps, from a start."""
     surface = sighting.surface
     return refine(surface.stamp_ns, start, surface.cloud_mav, sighting.ground_cloud, config)

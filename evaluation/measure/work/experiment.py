@@ -28,6 +28,7 @@ from evaluation.measure.protocol.mapping_pass import (
 )
 from evaluation.measure.protocol.negatives import add_negatives
 from evaluation.measure.protocol.trials import (
+    Iteration,
     localize_sequences,
     refine_sighting,
     sequence_starts,
@@ -42,11 +43,7 @@ from evaluation.setup.memory import peak_memory_mib
 from evaluation.table.row_writer import RowWriter
 from evaluation.table.rows import ALIGNMENT_STAGE, ResultTable
 from evaluation.table.tracking_quality import add_tracking
-from evaluation.table.truth_errors import (
-    pose_error,
-    squared_mahalanobis,
-    surface_error,
-)
+from evaluation.table.truth_errors import pose_error, surface_error
 from sim.recording.rendered import Flight, rendered
 from sim.recording.truth import Truth
 
@@ -177,9 +174,8 @@ def _add_sequences(
     iterations = Counter[int]()
     own = zip(maps.sightings[:length], localized.beliefs, strict=False)
     for iteration, (sighting, belief) in enumerate(own, 1):
-        error = pose_error(belief.T_ground_mav, sighting, truth)
-        distance = squared_mahalanobis(belief, sighting, truth)
-        out.add_belief(belief, error, distance, 0, iteration)
+        one = Iteration.of(belief, sighting, truth)
+        out.add_belief(belief, one.error, one.squared_mahalanobis, 0, iteration)
         iterations[0] = iteration
     filters = {
         sequence: (start, localizer_rng(unit.seed, unit.flight, sequence))

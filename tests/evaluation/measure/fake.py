@@ -1,4 +1,4 @@
-"""Units that cost nothing: what they give depends on their seed alone, and they leave a trace."""
+"""Fake units: their results depend on the seed alone, and each call leaves a trace file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Clusters elsewhere: a scheduler that is there, jobs of a batch system, and what is refused."""
+"""Dask clusters: a running scheduler, jobs of a batch system, and refusals."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ def scheduler(scratch: Path, threads: int = 1, daemon: bool = False) -> Iterator
         yield cluster.scheduler_address
 
 
-def test_a_scheduler_that_is_there_is_joined_and_left_alone(tmp_path: Path) -> None:
+def test_a_running_scheduler_is_used_and_not_stopped(tmp_path: Path) -> None:
     with scheduler(tmp_path) as address:
         for _ in range(2):
             assert squares(address, tmp_path) == [(0, 1), (1, 4), (2, 9)]
 
 
 @pytest.mark.slow
-def test_a_cluster_that_goes_away_is_told(tmp_path: Path) -> None:
+def test_a_cluster_that_stops_is_an_error(tmp_path: Path) -> None:
     with scheduler(tmp_path) as address, Crew(address, 1, 2, tmp_path) as crew:
         outcomes = crew.outcomes(nap, [0.0, 600.0])
         assert next(outcomes) == (0, 0.0)
@@ -74,7 +74,7 @@ def test_a_cluster_that_goes_away_is_told(tmp_path: Path) -> None:
     ("threads", "daemon", "message"),
     [(2, False, "--nthreads 1"), (1, True, "DASK_DISTRIBUTED__WORKER__DAEMON=False")],
 )
-def test_workers_that_cannot_do_it_are_refused(
+def test_unfit_workers_are_refused(
     threads: int, daemon: bool, message: str, tmp_path: Path
 ) -> None:
     with scheduler(tmp_path, threads, daemon) as address, pytest.raises(InputError, match=message):
@@ -85,7 +85,7 @@ def test_workers_that_cannot_do_it_are_refused(
     ("cluster", "message"),
     [("somewhere", "expected tcp://HOST:PORT"), ("tcp://127.0.0.1:1", "no Dask scheduler answers")],
 )
-def test_a_cluster_that_is_not_there_is_told(
+def test_a_missing_cluster_is_an_error(
     cluster: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("evaluation.measure.work.crew.CONNECT_S", 1)
@@ -93,7 +93,7 @@ def test_a_cluster_that_is_not_there_is_told(
         squares(cluster, tmp_path)
 
 
-def test_a_batch_system_is_described_as_for_dask_jobqueue(tmp_path: Path) -> None:
+def test_a_batch_system_is_configured_as_for_dask_jobqueue(tmp_path: Path) -> None:
     file = tmp_path / "slurm.yaml"
     file.write_text(SLURM)
     jobs = read_jobs(file)
@@ -113,9 +113,7 @@ def test_a_batch_system_is_described_as_for_dask_jobqueue(tmp_path: Path) -> Non
         ("processes: 4", "processes: 2", "must be the same number"),
     ],
 )
-def test_a_file_that_cannot_be_used_is_told(
-    old: str, new: str, message: str, tmp_path: Path
-) -> None:
+def test_an_invalid_file_is_an_error(old: str, new: str, message: str, tmp_path: Path) -> None:
     pytest.importorskip("dask_jobqueue")
     file = tmp_path / "slurm.yaml"
     with pytest.raises(InputError, match=r"slurm\.yaml: No such file"):
@@ -127,7 +125,7 @@ def test_a_file_that_cannot_be_used_is_told(
 
 
 @pytest.mark.slow
-def test_jobs_do_the_work(tmp_path: Path) -> None:
+def test_jobs_run_tasks(tmp_path: Path) -> None:
     pytest.importorskip("dask_jobqueue")
     file = tmp_path / "local.yaml"
     file.write_text(

@@ -64,7 +64,7 @@ def truth() -> Any:
 
 @pytest.fixture
 def sighting() -> Sighting:
-    """Both maps in their own frames, with errors of a few centimetres in what they show."""
+    """Both maps in their own frames, with errors of a few centimetres."""
     rng = np.random.default_rng(0)
     floor = np.column_stack([rng.uniform(-2, 2, (500, 2)), rng.normal(0, 0.03, 500)])
     grey = np.zeros((500, 3), np.uint8)
@@ -76,7 +76,7 @@ def sighting() -> Sighting:
     return Sighting(surface, ground, 5, T_mav_camera, 4, T_GROUND_WORLD @ AHEAD, 1.2)
 
 
-def test_the_true_surface_is_flat_and_whole(sighting: Sighting, truth: Any) -> None:
+def test_the_true_surface_is_flat_and_complete(sighting: Sighting, truth: Any) -> None:
     made = with_true_surface(sighting, truth)
     points_world = T_MAV_WORLD.inverse() @ made.surface.cloud_mav.points.astype(float)
     assert len(points_world) == CAMERA.width * CAMERA.height
@@ -85,7 +85,7 @@ def test_the_true_surface_is_flat_and_whole(sighting: Sighting, truth: Any) -> N
     assert made.heading == sighting.heading
 
 
-def test_the_true_ground_map_keeps_what_was_seen(sighting: Sighting, truth: Any) -> None:
+def test_the_true_ground_map_keeps_the_coverage(sighting: Sighting, truth: Any) -> None:
     made = with_true_ground_map(sighting, truth)
     here = T_GROUND_WORLD.inverse() @ made.ground_cloud.points.astype(float)
     before = T_GROUND_WORLD.inverse() @ sighting.ground_cloud.points.astype(float)

@@ -1,4 +1,4 @@
-"""Units are measured once each, whoever dies meanwhile and however many work."""
+"""Each unit is measured once, with any number of workers, even if workers or the run are killed."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def values(found: list[Finished]) -> list[float]:
     return [float(unit.table.frame["value"].iloc[0]) for unit in found]
 
 
-def test_a_flight_is_done_once_for_all_its_variants_and_never_again(tmp_path: Path) -> None:
+def test_a_flight_is_measured_once_for_all_its_variants(tmp_path: Path) -> None:
     units = fake_units(tmp_path / "flights", 3)
     # A worker that dies over the first flight costs a second try of it.
     (tmp_path / "flights/flight_0" / DIE_ONCE).touch()
@@ -58,7 +58,7 @@ def test_a_flight_is_done_once_for_all_its_variants_and_never_again(tmp_path: Pa
 
 
 @pytest.mark.slow
-def test_the_same_bytes_for_one_two_and_four_workers(tmp_path: Path) -> None:
+def test_results_do_not_depend_on_the_number_of_workers(tmp_path: Path) -> None:
     units = fake_units(tmp_path / "flights", 5)
     made = {
         table_bytes(measured(units, tmp_path / f"out{cores}", cores), tmp_path / "table")
@@ -75,7 +75,7 @@ def test_the_same_bytes_for_one_two_and_four_workers(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_task_that_kills_every_worker_is_given_up(tmp_path: Path) -> None:
+def test_a_task_that_kills_every_worker_is_an_error(tmp_path: Path) -> None:
     units = fake_units(tmp_path / "flights", 1)
     (tmp_path / "flights/flight_0" / DIE).touch()
     with pytest.raises(AirgroundError, match="4 processes died over the same task"):
@@ -84,7 +84,9 @@ def test_a_task_that_kills_every_worker_is_given_up(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_what_cannot_be_measured_ends_the_run_but_keeps_what_is_done(tmp_path: Path) -> None:
+def test_a_refused_unit_ends_the_run_and_finished_units_stay(
+    tmp_path: Path,
+) -> None:
     units = fake_units(tmp_path / "flights", 2)
     refusing = tmp_path / "flights/flight_1" / REFUSE
     refusing.touch()
@@ -111,7 +113,7 @@ class FillingDisk:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-def test_a_full_disk_leaves_whole_units_only(
+def test_a_full_disk_leaves_complete_units_only(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     units = fake_units(tmp_path / "flights", 3)
@@ -132,7 +134,7 @@ def test_a_full_disk_leaves_whole_units_only(
 
 
 @pytest.mark.slow
-def test_a_killed_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
+def test_a_killed_run_is_continued(tmp_path: Path) -> None:
     out, flights = tmp_path / "out", tmp_path / "flights"
     command = [sys.executable, "-m", "tests.evaluation.measure.killed_run"]
     process = subprocess.Popen(
@@ -161,6 +163,6 @@ def test_a_killed_run_goes_on_where_it_stopped(tmp_path: Path) -> None:
         assert runs(flights)[seed] == before[seed] + (not finished)
 
 
-def test_an_empty_run_starts_nobody(tmp_path: Path) -> None:
+def test_an_empty_run_starts_no_worker(tmp_path: Path) -> None:
     with Crew("tcp://127.0.0.1:1", 1, 0, tmp_path) as crew:
         assert measure([], UnitStore(tmp_path / "units"), crew) == []

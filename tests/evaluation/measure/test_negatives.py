@@ -1,4 +1,4 @@
-"""Negative cases made of heaps of boxes: what is cut away is gone, and nothing is claimed."""
+"""Negative cases: the overlap is removed, and no position is claimed."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def overlap(sighting: Sighting, truth: Any) -> float:
     return float(np.isfinite(seen.heights[x, y]).sum() / len(cells))
 
 
-def test_of_the_overlap_a_tenth_is_left_and_of_the_map_much(
+def test_a_tenth_of_the_overlap_and_most_of_the_map_are_left(
     sightings: Sequence[Sighting], truth: Any
 ) -> None:
     for sighting in sightings:
@@ -96,7 +96,7 @@ def test_of_the_overlap_a_tenth_is_left_and_of_the_map_much(
 
 
 @pytest.mark.parametrize("which", ["surface", "ground"])
-def test_without_points_there_is_nothing_to_cut(
+def test_maps_without_points_are_unchanged(
     sightings: Sequence[Sighting], truth: Any, which: str
 ) -> None:
     one, empty = sightings[0], PointCloud.empty()
@@ -109,7 +109,7 @@ def test_without_points_there_is_nothing_to_cut(
     assert without_overlap(bare, truth) is bare
 
 
-def test_nothing_is_claimed_where_there_is_nothing(
+def test_no_position_is_claimed_in_a_negative_case(
     sightings: list[Sighting], stranger: GroundPass, truth: Any
 ) -> None:
     out = RowWriter("heap", 1, 0, BEST)
@@ -127,7 +127,7 @@ def test_nothing_is_claimed_where_there_is_nothing(
     assert len(table.rows("wrong_map", "error_m")) == 0
 
 
-def test_the_same_with_the_right_map_is_claimed(sightings: list[Sighting], truth: Any) -> None:
+def test_a_position_is_claimed_with_the_right_map(sightings: list[Sighting], truth: Any) -> None:
     """Else nothing would follow from claiming nothing."""
     rng = np.random.default_rng(1)
     steps = [step for *_, step in localize_sequence(sightings, truth, Config(), rng) if step]
@@ -137,7 +137,7 @@ def test_the_same_with_the_right_map_is_claimed(sightings: list[Sighting], truth
     assert alignment.accepted, alignment.refusal
 
 
-def test_another_map_comes_with_another_robot(
+def test_another_map_has_the_pose_of_its_own_robot(
     sightings: list[Sighting], stranger: GroundPass
 ) -> None:
     lost = over_another_map(sightings[0], stranger)
@@ -146,7 +146,7 @@ def test_another_map_comes_with_another_robot(
     assert lost.surface is sightings[0].surface
 
 
-def test_without_a_stranger_only_the_overlap_is_taken(
+def test_without_a_stranger_only_the_overlap_case_is_measured(
     sightings: list[Sighting], truth: Any
 ) -> None:
     out = RowWriter("heap", 1, 0, BEST)

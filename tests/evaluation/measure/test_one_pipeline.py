@@ -1,4 +1,4 @@
-"""What the protocol measures is what `run` gives: the same pipeline, the same random numbers."""
+"""The protocol and `run` give the same numbers: same pipeline, same random numbers."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_run_and_protocol_give_the_same_numbers(path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_setups_that_share_maps_are_localized_as_in_a_pass_of_their_own(path: Path) -> None:
+def test_setups_that_share_maps_give_the_results_of_a_pass_of_their_own(path: Path) -> None:
     recording, truth = Recording.open(path), Truth.open(path)
     few = Setup(with_localization(Config(), particles=50))
     maps = map_recording(recording, truth, Setup(Config()), 0)

@@ -1,4 +1,4 @@
-"""Folders that runs go on with, and folders that they leave alone."""
+"""Folders that a run continues, and folders that it does not touch."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def fail_after_a_unit(out: Path) -> None:
         raise RuntimeError
 
 
-def test_results_appear_when_all_are_whole(tmp_path: Path) -> None:
+def test_results_appear_when_all_are_complete(tmp_path: Path) -> None:
     out = tmp_path / "deep/out"
     with pytest.raises(RuntimeError):
         fail_after_a_unit(out)
@@ -40,13 +40,13 @@ def test_results_appear_when_all_are_whole(tmp_path: Path) -> None:
     assert {file.name for file in out.iterdir()} == {LOCK, "units", "summary.json", "figures"}
 
 
-def test_nothing_done_leaves_nothing(tmp_path: Path) -> None:
+def test_a_run_without_results_leaves_no_folder(tmp_path: Path) -> None:
     with pytest.raises(RuntimeError), resumable_folder(tmp_path / "out"):
         raise RuntimeError
     assert list(tmp_path.iterdir()) == []
 
 
-def test_other_folders_are_left_alone(tmp_path: Path) -> None:
+def test_other_folders_are_refused_and_unchanged(tmp_path: Path) -> None:
     (tmp_path / "mine").write_text("precious")
     with pytest.raises(InputError, match="exists already"), resumable_folder(tmp_path):
         pass
@@ -69,7 +69,7 @@ def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
         pass
 
 
-def test_what_a_killed_run_left_half_written_is_removed(tmp_path: Path) -> None:
+def test_partial_files_of_a_killed_run_are_removed(tmp_path: Path) -> None:
     store = UnitStore(tmp_path)
     store.write("whole", {"a": 1}, FOUND)
     half = tmp_path / ".partial-x"

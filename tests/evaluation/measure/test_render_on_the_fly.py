@@ -1,4 +1,4 @@
-"""What is measured on images that are drawn on the fly is what is measured on a recording."""
+"""Results on images rendered on the fly equal those on a recording on disk."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -24,7 +24,7 @@ def measured(finished: Finished) -> list[str]:
 
 
 @pytest.mark.slow
-def test_results_are_those_from_disk(tmp_path: Path) -> None:
+def test_results_equal_those_from_disk(tmp_path: Path) -> None:
     scene = parse_scene(SCENE, "small.toml").model_copy(update={"duration_s": 7.0})
     flight = Flight(scene, 3, 0, NOMINAL)
     path = record(scene, 3, NOMINAL, tmp_path / "recording", workers=1)

@@ -1,4 +1,4 @@
-"""Which flights the protocol flies: enough for the sequences asked for, and not one more."""
+"""Flights of the protocol: as many as the requested sequences need."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_only_the_primary_setups_sequences_count() -> None:
     assert flown_for(30, ("tiny",), 1, setups=3)[0] == flown_for(30, ("tiny",), 1)[0]
 
 
-def test_nothing_can_be_counted_over_control_scenes_alone() -> None:
+def test_control_scenes_alone_give_no_sequences() -> None:
     assert len(flown_for(30, ("flat",), 2)[0]) == 2
 
 
@@ -139,7 +139,7 @@ def test_negatives_are_tried_on_the_primary_setup_of_flights_with_something_to_f
         assert found == {(False, None)}
 
 
-def test_the_words_say_how_much(tmp_path: Path) -> None:
+def test_options_set_the_amount(tmp_path: Path) -> None:
     plan = Reproduce(out=tmp_path).plan()
     assert (plan.protocol.sequences, plan.sequences) == (6, 0)
     more = ("protocol.sequences_per_flight=14",)

@@ -1,4 +1,4 @@
-"""The fast suite: which flights, in which order; and that it can say something."""
+"""The fast suite: its flights, their order, and its control."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sequences that overlap run side by side as each would alone, and compute once what they share."""
+"""Overlapping sequences give the results of each alone, and compute shared steps once."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def flown() -> Flown:
 
 
 @pytest.mark.parametrize("name", CONFIGS)
-def test_side_by_side_is_as_one_by_one(flown: Flown, name: str) -> None:
+def test_overlapping_sequences_equal_single_ones(flown: Flown, name: str) -> None:
     config, sightings = CONFIGS[name], flown.sightings
     filters = {i: (start, np.random.default_rng(start)) for i, start in enumerate(STARTS)}
     together: dict[int, list[Belief]] = defaultdict(list)

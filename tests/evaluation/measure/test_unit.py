@@ -1,4 +1,4 @@
-"""A key stands for everything that made a unit, and for nothing else."""
+"""The key of a unit depends on everything that determines its rows, and on nothing else."""
 
 from __future__ import annotations
 
@@ -63,18 +63,18 @@ OTHERS: dict[str, list[Unit]] = {
 }
 
 
-def test_any_other_ingredient_makes_another_key() -> None:
+def test_every_attribute_changes_the_key() -> None:
     assert OTHERS.keys() == {field.name for field in fields(Unit)}
     units = [UNIT, *(unit for others in OTHERS.values() for unit in others)]
     assert len({unit.key() for unit in units}) == len(units)
 
 
-def test_the_same_ingredients_make_the_same_key() -> None:
+def test_equal_units_have_the_same_key() -> None:
     assert replace(UNIT, setup=Setup(Config()), protocol=Protocol()).key() == UNIT.key()
     assert UNIT.key() == key_of(dict(reversed(UNIT.made_from().items())))
 
 
-def test_other_code_makes_another_key(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_code_changes_the_key(monkeypatch: pytest.MonkeyPatch) -> None:
     before = UNIT.key()
     monkeypatch.setattr(module, "code_version", lambda: "other")
     assert UNIT.key() != before
@@ -109,7 +109,7 @@ def test_any_change_of_any_entry_changes_the_key(path: tuple[Any, ...], value: A
     assert (key_of(made_from) == UNIT.key()) == unchanged
 
 
-def test_a_recording_is_known_by_its_header(tmp_path: Path) -> None:
+def test_a_recording_is_identified_by_its_header(tmp_path: Path) -> None:
     stored = replace(UNIT, recording=tmp_path)
     with pytest.raises(InputError, match=r"recording\.toml: cannot be read"):
         stored.key()
@@ -123,7 +123,7 @@ def test_a_recording_is_known_by_its_header(tmp_path: Path) -> None:
     assert replace(UNIT, recording=moved).key() != before
 
 
-def test_units_that_share_their_maps_are_done_together() -> None:
+def test_units_that_share_their_maps_form_a_group() -> None:
     few, many = (
         replace(UNIT, setup=Setup(with_localization(Config(), particles=n))) for n in (50, 800)
     )
@@ -132,7 +132,7 @@ def test_units_that_share_their_maps_are_done_together() -> None:
     assert grouped([few, exact, many, other_seed]) == [[few, many], [exact], [other_seed]]
 
 
-def test_what_is_done_for_the_first_setup_alone_is_done_for_the_right_one() -> None:
+def test_a_unit_with_extras_is_the_first_of_its_group() -> None:
     asked = {"showcase": True, "baselines": True, "negatives": True, "stranger": FLIGHT}
     shown, plain = replace(UNIT, **asked), replace(UNIT, seed=3)  # type: ignore[arg-type]
     assert grouped([shown, plain]) == [[shown, plain]]

@@ -1,4 +1,4 @@
-"""Wide searches of a heap find it, and the lead is what a cost map says."""
+"""Wide searches find the true place, and the lead follows from the cost map."""
 
 from __future__ import annotations
 
@@ -33,24 +33,24 @@ def cost_map(costs: dict[tuple[int, int], float], fill: float = 1.0) -> CostMap:
 PLACE = np.array([1.5, 3.0])
 
 
-def test_the_lead_is_over_the_best_other_place() -> None:
+def test_the_lead_compares_with_the_best_other_place() -> None:
     assert lead_of(cost_map({(10, 20): 0.2, (2, 3): 0.7}), PLACE) == pytest.approx(0.5)
     assert lead_of(cost_map({(10, 20): 0.7, (2, 3): 0.2}), PLACE) == pytest.approx(-0.5)
 
 
-def test_neighbours_of_the_true_place_are_no_rivals() -> None:
+def test_neighbours_of_the_true_place_are_not_compared() -> None:
     # One cell off is still the place, two cells off neither it nor another, three are another.
     assert lead_of(cost_map({(11, 20): 0.2}), PLACE) == pytest.approx(0.8)
     assert lead_of(cost_map({(12, 20): 0.2}), PLACE) == pytest.approx(0.0)
     assert lead_of(cost_map({(13, 20): 0.2}), PLACE) == pytest.approx(-0.8)
 
 
-def test_places_without_a_cost_are_the_worst() -> None:
+def test_places_without_a_cost_have_the_worst_cost() -> None:
     assert lead_of(cost_map({(2, 3): 0.4}, fill=np.nan), PLACE) == pytest.approx(0.4 - WORST)
     assert lead_of(cost_map({(10, 20): 0.4}, fill=np.nan), PLACE) == pytest.approx(WORST - 0.4)
 
 
-def test_each_aerial_map_is_found_by_itself_in_a_wider_region(flown: Flown) -> None:
+def test_each_aerial_map_is_located_in_a_wider_region(flown: Flown) -> None:
     out = RowWriter("heap", flown.seed, 0, CONDITION)
     add_wide_searches(out, flown.sightings, flown.truth, Config(), (flown.seed, 0), 3)  # type: ignore[arg-type]
     table = ResultTable.from_rows(out.rows)
@@ -82,7 +82,7 @@ def test_the_region_reaches_twice_as_far(flown: Flown, monkeypatch: pytest.Monke
     assert [config.localization.search_radius_m for config in asked] == [6.0, 6.0]
 
 
-def test_nothing_is_asked_of_no_aerial_map(flown: Flown) -> None:
+def test_without_aerial_maps_there_are_no_rows(flown: Flown) -> None:
     out = RowWriter("heap", flown.seed, 0, CONDITION)
     add_wide_searches(out, [], flown.truth, Config(), (0, 0), 3)  # type: ignore[arg-type]
     add_wide_searches(out, flown.sightings, flown.truth, Config(), (0, 0), 0)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""What a worker does between tasks."""
+"""Memory of a worker between tasks."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from evaluation.measure.work import crew
 from evaluation.measure.work.crew import PreparedWorker
 
 
-def test_kept_memory_is_handed_back_when_a_task_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_free_memory_is_returned_when_a_task_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     handed_back: list[bool] = []
     monkeypatch.setattr(crew, "hand_back_memory", lambda: handed_back.append(True))
     plugin = PreparedWorker(1)
