@@ -34,7 +34,7 @@ def fresh_folder(path: Path) -> Iterator[Path]:
         check_free(path)
         partial.rename(path)
     except OSError as error:
-        # A full disk is noticed while writing, when nobody remembers which file it was.
+        # A full disk is noticed while writing, where the error does not name the file.
         if error.errno is not None and error.filename is None:
             raise OSError(error.errno, error.strerror, str(path)) from error
         raise

@@ -136,7 +136,7 @@ def with_cameras(spec: mujoco.MjSpec, cameras: Mapping[str, PinholeCamera]) -> m
                 camera.height / 2 - 0.5 - camera.cy,
             ],
         )
-    # No pixel is cleared that nobody sees, and no box has more triangles than it needs.
+    # No larger buffer than the largest camera, no multisampling, two triangles per face of a box.
     visual, quality = spec.visual.global_, spec.visual.quality
     visual.offwidth = max(c.width for c in cameras.values())
     visual.offheight = max(c.height for c in cameras.values())

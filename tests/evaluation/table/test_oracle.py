@@ -1,4 +1,4 @@
-"""An oracle is exact when told so, and off by what it says otherwise."""
+"""An oracle is exact without noise, and off by the stated noise with it."""
 
 from types import SimpleNamespace
 
