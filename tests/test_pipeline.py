@@ -187,7 +187,7 @@ def test_same_seed_same_bytes(recorded: Recorded, found: tuple[Pipeline, list[Ev
 
 
 @pytest.mark.slow
-def test_lost_tracking_is_told_and_maps_nothing(recorded: Recorded) -> None:
+def test_lost_tracking_is_reported_and_maps_nothing(recorded: Recorded) -> None:
     lost = dict.fromkeys(recorded.mav)
     pipeline = empty_pipeline()
     frames = recorded.frames(FrontEnds(Known(lost), Known(recorded.ground)))

@@ -81,10 +81,10 @@ def calibrate(
         )
         tables.append((true, nominal))
     scale = 1 + signs[4] * errors.depth_scale
-    (mav_true, mav_told), (ground_true, ground_told) = tables
+    (mav_true, mav_nominal), (ground_true, ground_nominal) = tables
     return Calibrations(
         CalibrationTable(mav=mav_true, ground=_with_depth(ground_true, DEPTH_UNITS_PER_M * scale)),
-        CalibrationTable(mav=mav_told, ground=_with_depth(ground_told, DEPTH_UNITS_PER_M)),
+        CalibrationTable(mav=mav_nominal, ground=_with_depth(ground_nominal, DEPTH_UNITS_PER_M)),
     )
 
 

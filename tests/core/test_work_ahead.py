@@ -28,7 +28,7 @@ def test_no_more_is_read_than_was_promised() -> None:
     assert len(seen) <= 3 + AHEAD
 
 
-def test_what_cannot_be_read_is_told_when_its_turn_comes() -> None:
+def test_what_cannot_be_read_raises_when_its_turn_comes() -> None:
     def read(index: int) -> int:
         if index == 2:
             raise ValueError("broken")

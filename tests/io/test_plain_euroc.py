@@ -51,7 +51,7 @@ def test_messages_come_in_order_with_samples_before_each_image(folder: Path) -> 
     np.testing.assert_allclose(samples[1].accelerometer[0], UP_IMU)
 
 
-def test_images_are_undistorted_to_the_camera_that_is_told(folder: Path) -> None:
+def test_images_are_undistorted_to_the_nominal_camera(folder: Path) -> None:
     """A point of the scene lands where the pinhole camera says."""
     recording = mav(folder)
     camera = recording.calibration.camera

@@ -60,7 +60,7 @@ def test_open3d_reads_the_same_cloud(tmp_path: Path) -> None:
         (lambda data: data.replace(b"uchar red", b"double red"), "double red"),
     ],
 )
-def test_a_damaged_file_is_told(tmp_path: Path, damage, pattern: str) -> None:
+def test_a_damaged_file_is_reported(tmp_path: Path, damage, pattern: str) -> None:
     file = tmp_path / "a.ply"
     write_ply(file, cloud())
     file.write_bytes(damage(file.read_bytes()))
@@ -68,6 +68,6 @@ def test_a_damaged_file_is_told(tmp_path: Path, damage, pattern: str) -> None:
         read_ply(file)
 
 
-def test_a_missing_file_is_told(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.ply"):
         read_ply(tmp_path / "none.ply")

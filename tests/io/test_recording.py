@@ -180,7 +180,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("name", BROKEN)
-def test_damage_is_told_when_opening(path: Path, name: str) -> None:
+def test_damage_is_reported_when_opening(path: Path, name: str) -> None:
     damage, pattern = BROKEN[name]
     damage(path)
     with pytest.raises(RecordingError) as caught:
@@ -210,7 +210,7 @@ def flip_a_byte(file: Path) -> None:
         (lambda file: cv2.imwrite(str(file), np.zeros((16, 20), np.uint8)), "20x16"),
     ],
 )
-def test_a_damaged_image_is_told_when_streaming(path: Path, damage, pattern: str) -> None:
+def test_a_damaged_image_is_reported_when_streaming(path: Path, damage, pattern: str) -> None:
     recording = Recording.open(path)
     damage(path / IMAGE)
     with pytest.raises(RecordingError, match=pattern) as caught:

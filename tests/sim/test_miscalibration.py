@@ -18,7 +18,7 @@ def drawn(preset: SensorPreset, seed: int = 0) -> Calibrations:
     return calibrate(420.0, MAV, GROUND, preset, np.random.default_rng(seed))
 
 
-def test_without_errors_the_truth_is_told() -> None:
+def test_without_errors_the_calibration_is_true() -> None:
     true, nominal = drawn(NONE).true, drawn(NONE).nominal
     assert (true.mav.camera, true.ground.camera) == (nominal.mav.camera, nominal.ground.camera)
     assert true.ground.depth == nominal.ground.depth

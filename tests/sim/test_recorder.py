@@ -193,6 +193,6 @@ def test_stamps_of_images() -> None:
     assert stamps[-1] <= 1_980_000_000 < stamps[-1] + 1e9 / 30
 
 
-def test_no_truth_is_told(tmp_path: Path) -> None:
+def test_no_truth_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(AirgroundError, match="no truth"):
         Truth.open(tmp_path)

@@ -72,7 +72,7 @@ def read_all(recording: Recording) -> None:
         pass
 
 
-def test_a_dead_process_is_told() -> None:
+def test_a_dead_process_is_reported() -> None:
     with rendered(FLIGHT, workers=1) as drawn:
         for child in multiprocessing.active_children():
             child.kill()

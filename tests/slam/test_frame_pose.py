@@ -60,7 +60,9 @@ def errors(fit: PoseFit | None) -> tuple[float, float]:
 @WITH_GYRO
 @pytest.mark.parametrize("outliers", [0.0, 0.2, 0.45])
 @pytest.mark.parametrize("depth", [False, True])
-def test_outliers_are_told_from_points_that_fit(gyro: bool, outliers: float, depth: bool) -> None:
+def test_outliers_are_distinguished_from_points_that_fit(
+    gyro: bool, outliers: float, depth: bool
+) -> None:
     fit, wrong = fit_of(gyro, outliers, depth=depth)
     moved, turned = errors(fit)
     assert (moved < 0.006, turned < 0.003) == (True, True)

@@ -140,7 +140,7 @@ def test_a_wrong_belief_of_where_it_is_brings_no_wrong_points_back() -> None:
     assert mapping.map.keyframes[-1].ids.min() >= count
 
 
-def test_the_map_follows_no_more_corners_than_it_was_told() -> None:
+def test_the_map_follows_no_more_corners_than_configured() -> None:
     mapping = Mapping()
     for x in (0.9, 0.95, 1.0, 1.05):
         mapping.insert(view(x, 0.9))

@@ -69,7 +69,7 @@ def test_the_table_and_the_command_know_the_same_formats() -> None:
         assert verb.format == name  # type: ignore[attr-defined]
 
 
-def test_plain_folders_are_told_from_recordings(tmp_path: Path) -> None:
+def test_plain_folders_are_distinguished_from_recordings(tmp_path: Path) -> None:
     (tmp_path / "rgb.txt").touch()
     with pytest.raises(InputError, match="only recordings that simulate has written"):
         Simulated.open(tmp_path)

@@ -81,7 +81,7 @@ def test_images_are_the_recordings(bag: Bag, simulated: Simulated) -> None:
         np.testing.assert_array_equal(bgr[..., ::-1], image.colour)
 
 
-def test_samples_and_calibration_are_as_told(bag: Bag, simulated: Simulated) -> None:
+def test_samples_and_calibration_are_as_recorded(bag: Bag, simulated: Simulated) -> None:
     for robot in ("mav", "ground"):
         imu, magnetic = simulated.samples(robot)
         for index in (0, 100, 999):

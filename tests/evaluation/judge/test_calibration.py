@@ -57,7 +57,7 @@ def test_what_is_covered_is_what_theory_says(believed: float) -> None:
         assert part.median_normalized_error() == pytest.approx(median, rel=0.1)
 
 
-def test_a_belief_that_is_too_sure_is_found_from_one_that_is_right() -> None:
+def test_a_belief_that_is_too_sure_is_distinguished_from_one_that_is_right() -> None:
     right, sure = drawn(1.0), drawn(0.25)
     for share in ELLIPSES:
         observed = right.coverage(share)
@@ -87,7 +87,7 @@ def test_particles_in_one_place_or_line_leave_nothing_else_possible(covariance: 
     assert one.mean_normalized_error() == np.inf
 
 
-def test_the_distance_is_found_where_the_particles_live() -> None:
+def test_the_distance_is_that_of_the_particles() -> None:
     T_ground_mav = SE3.from_heading(0.7, (1.0, -2.0, 0.4))
     T_mav_camera, T_reference = (
         SE3.from_rotation_vector((np.pi, 0, 0), place) for place in ((2, 1, 2), (0.5, 0.8, 2))

@@ -57,7 +57,7 @@ def test_the_same_results_pass(accepted: Path, capsys: pytest.CaptureFixture[str
     assert "No difference seen" in capsys.readouterr().out
 
 
-def test_worse_results_fail_and_are_told_in_three_forms(accepted: Path, tmp_path: Path) -> None:
+def test_worse_results_fail_and_are_reported_in_three_forms(accepted: Path, tmp_path: Path) -> None:
     results = write(make_results(SEEDS, {"error_median_m": 1.4}), tmp_path / "worse")
     pull, xml = tmp_path / "check.md", tmp_path / "check.xml"
     words = ("check", results, "--against", accepted, "--markdown", pull, "--junit", xml)

@@ -46,7 +46,7 @@ def test_a_metric_that_got_worse_is_named_and_no_other() -> None:
     assert better(after, before) == ["refined_translation"]
 
 
-def test_a_change_too_small_to_matter_is_told_but_fails_nothing() -> None:
+def test_a_change_too_small_to_matter_is_reported_but_fails_nothing() -> None:
     before, after = measured(SEEDS), measured(SEEDS, {"after_translation_m": 1.01})
     assert worse(before, after) == []
     (slight,) = compare(before, after).of(Verdict.SLIGHTLY_WORSE)

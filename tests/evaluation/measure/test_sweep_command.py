@@ -32,7 +32,7 @@ WORDS += ["--set", "protocol.sequences_per_flight=1", "--set", "protocol.trials=
         ({"vary": ("scene.texture=1",), "scenes": ("nowhere",)}, "unknown scene 'nowhere'"),
     ],
 )
-def test_wrong_words_are_told_before_anything_is_done(
+def test_wrong_words_are_rejected_before_anything_is_done(
     words: dict[str, object], message: str, tmp_path: Path
 ) -> None:
     with pytest.raises(InputError, match=message):

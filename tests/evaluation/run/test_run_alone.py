@@ -102,7 +102,7 @@ def test_front_ends_stand_beside_each_other(
     assert said.index("front end opencv") < said.index("front end file")
 
 
-def test_two_robots_in_one_folder_must_be_told_apart(
+def test_two_robots_in_one_folder_must_be_distinguished(
     small: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ("track", small, "--front-end", "opencv", "--out", tmp_path / "out")

@@ -89,7 +89,7 @@ def test_fewer_trials_are_noticed(before: Run) -> None:
     ]
 
 
-def test_failures_that_came_and_went_are_told_apart(before: Run) -> None:
+def test_failures_that_came_and_went_are_distinguished(before: Run) -> None:
     frame = before.table.frame.copy()
     errors = (frame["metric"] == "error_m") & (frame["iteration"] == 4)
     first = frame.index[errors & (frame["scene"] == "tiny")][0]

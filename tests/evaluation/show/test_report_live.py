@@ -31,7 +31,7 @@ def test_the_table_says_why_frames_were_not_mapped() -> None:
     assert "survived" not in cells
 
 
-def test_a_robot_that_died_is_told_first() -> None:
+def test_a_robot_that_died_is_reported_first() -> None:
     table = live_table(live_rows(survived=False))
     assert table.rows[0] == ("survived", "0 of 1", "1 of 1")
 

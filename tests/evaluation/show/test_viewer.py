@@ -180,7 +180,7 @@ def stand_in(folder: Path, then: str) -> Path:
     return file
 
 
-def test_a_viewer_that_listens_but_cannot_draw_is_told(
+def test_a_viewer_that_listens_but_cannot_draw_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     program = stand_in(tmp_path, "time.sleep(0.3); sys.exit(102)")

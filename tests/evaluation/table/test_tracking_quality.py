@@ -83,7 +83,7 @@ def one(table: ResultTable, metric: str) -> float:
     return float(value)
 
 
-def test_live_and_final_poses_are_told_apart(measured: ResultTable) -> None:
+def test_live_and_final_poses_are_distinguished(measured: ResultTable) -> None:
     assert one(measured, "mav_ate_se3_rmse_m") == pytest.approx(SIGMA_M * 3**0.5, rel=0.1)
     assert one(measured, "mav_final_ate_se3_rmse_m") < 1e-9
     assert abs(one(measured, "mav_final_scale_error")) < 1e-9
