@@ -8,6 +8,8 @@ each time, and only so the number of keyframes stays bounded in a bounded area.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
 from airground.config import KeyframeSlam
@@ -26,36 +28,27 @@ COVERED_BY = 5
 """Number of other keyframes that must have such a point in view."""
 
 
+@dataclass(eq=False)
 class KeyframeCuller:
     """Looks at one or two keyframes whenever a new one was made.
 
     Those of the window are never taken out, nor the first keyframe, and none that adjusting the
     whole map still needs for its inertial motion.
 
-    Args:
-        sparse_map, adjuster, recovery, path: Map and what depends on it, changed in place.
+    Attributes:
+        map, adjuster, recovery, path: Map and what depends on it, changed in place.
         camera, T_rig_camera: The robot's camera.
         parameters: The robot's section of the configuration.
     """
 
-    def __init__(
-        self,
-        sparse_map: SparseMap,
-        adjuster: MapAdjuster,
-        recovery: Recovery,
-        path: TrackedPath,
-        camera: PinholeCamera,
-        T_rig_camera: SE3,
-        parameters: KeyframeSlam,
-    ) -> None:
-        self._map = sparse_map
-        self._adjuster = adjuster
-        self._recovery = recovery
-        self._path = path
-        self._camera = camera
-        self._T_rig_camera = T_rig_camera
-        self._parameters = parameters
-        self._next = 1
+    map: SparseMap
+    adjuster: MapAdjuster
+    recovery: Recovery
+    path: TrackedPath
+    camera: PinholeCamera
+    T_rig_camera: SE3
+    parameters: KeyframeSlam
+    _next: int = field(default=1, init=False)
 
     def cull(self, inertial: bool) -> None:
         """Judge the keyframe that just left the window and, in turn, one of the older ones.
@@ -64,7 +57,7 @@ class KeyframeCuller:
             inertial: Whether the map is metric and gravity-aligned by the accelerometer.
         """
         # One keyframe stays beside the window: inertial motion leads from it.
-        left = len(self._map.keyframes) - self._parameters.window - 2
+        left = len(self.map.keyframes) - self.parameters.window - 2
         if left >= 1:
             self._judge(left, inertial)
         if left >= 2:
@@ -74,31 +67,31 @@ class KeyframeCuller:
 
     def _judge(self, keyframe: int, inertial: bool) -> bool:
         """Take a keyframe out if it may go; returns whether it did."""
-        if inertial and not self._adjuster.can_skip(keyframe):
+        if inertial and not self.adjuster.can_skip(keyframe):
             return False
         if not self.covered(keyframe):
             return False
-        keyframes = self._map.keyframes
+        keyframes = self.map.keyframes
         before, gone, after = keyframes[keyframe - 1 : keyframe + 2]
         sooner = gone.stamp_ns - before.stamp_ns <= after.stamp_ns - gone.stamp_ns
-        self._path.rehang(gone, before if sooner else after)
-        self._adjuster.skip(keyframe, inertial)
-        self._recovery.forget(gone.stamp_ns)
-        self._map.cull(keyframe)
+        self.path.rehang(gone, before if sooner else after)
+        self.adjuster.skip(keyframe, inertial)
+        self.recovery.forget(gone.stamp_ns)
+        self.map.cull(keyframe)
         return True
 
     def covered(self, keyframe: int) -> bool:
         """Whether enough others outside of the window have a keyframe's points in view."""
-        one = self._map.keyframes[keyframe]
-        ids = one.ids[self._map.mapped(one.ids)]
+        one = self.map.keyframes[keyframe]
+        ids = one.ids[self.map.mapped(one.ids)]
         if len(ids) == 0:
             return True
-        points = self._map.positions[ids]
-        outside = self._map.keyframes[: -self._parameters.window - 1]
+        points = self.map.positions[ids]
+        outside = self.map.keyframes[: -self.parameters.window - 1]
         turned = np.array([other.state.rotation for other in outside])
         centres = np.array([other.state.position for other in outside])
-        centres += turned @ self._T_rig_camera.translation
-        rotations = turned @ self._T_rig_camera.rotation
+        centres += turned @ self.T_rig_camera.translation
+        rotations = turned @ self.T_rig_camera.rotation
         alike = self._alike(rotations, centres, keyframe, points.mean(axis=0))
         alike[keyframe] = False
         views = self._views(rotations[alike], centres[alike], points)
@@ -116,7 +109,7 @@ class KeyframeCuller:
     def _views(self, rotations: F64, centres: F64, points: F64) -> I64:
         """(n,) in how many of the cameras each point lies inside the image."""
         seen = np.einsum("kij,kni->knj", rotations, points - centres[:, None])
-        camera = self._camera
+        camera = self.camera
         with np.errstate(divide="ignore", invalid="ignore"):
             x = camera.fx * seen[..., 0] / seen[..., 2] + camera.cx
             y = camera.fy * seen[..., 1] / seen[..., 2] + camera.cy

@@ -34,26 +34,20 @@ class News:
     parallax_px: float
 
 
+@dataclass(eq=False)
 class KeyframeChoice:
     """Chooses the images that stay.
 
-    Args:
-        sparse_map: Map with the keyframes so far.
+    Attributes:
+        map: Map with the keyframes so far.
         camera, T_rig_camera: The robot's camera.
         parameters: The robot's section of the configuration.
     """
 
-    def __init__(
-        self,
-        sparse_map: SparseMap,
-        camera: PinholeCamera,
-        T_rig_camera: SE3,
-        parameters: KeyframeSlam,
-    ) -> None:
-        self._map = sparse_map
-        self._camera = camera
-        self._R_rig_camera = T_rig_camera.rotation
-        self._parameters = parameters
+    map: SparseMap
+    camera: PinholeCamera
+    T_rig_camera: SE3
+    parameters: KeyframeSlam
 
     def wanted(self, tracker: FeatureTracker, state: RigState, stamp_ns: int, timed: bool) -> bool:
         """Whether the newest image shows enough that the last keyframe did not.
@@ -64,13 +58,13 @@ class KeyframeChoice:
             stamp_ns: Stamp of the image [ns].
             timed: Whether a keyframe is due now and then, even if nothing is new.
         """
-        last, parameters = self._map.keyframes[-1], self._parameters
+        last, parameters = self.map.keyframes[-1], self.parameters
         if timed and (stamp_ns - last.stamp_ns) * 1e-9 >= parameters.keyframe_interval_s:
             return True
-        last_view = last.state.rotation @ self._R_rig_camera
-        turn = last_view.T @ state.rotation @ self._R_rig_camera
-        news = what_is_new(self._map, last, tracker, turn, self._camera)
-        scarce = self._map.mapped(tracker.ids).sum() < SCARCE_POINTS
+        last_view = last.state.rotation @ self.T_rig_camera.rotation
+        turn = last_view.T @ state.rotation @ self.T_rig_camera.rotation
+        news = what_is_new(self.map, last, tracker, turn, self.camera)
+        scarce = self.map.mapped(tracker.ids).sum() < SCARCE_POINTS
         parallax_px = (HASTE if scarce else 1.0) * parameters.keyframe_parallax_px
         return (
             news.share_left < parameters.keyframe_share

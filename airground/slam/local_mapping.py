@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -51,39 +51,28 @@ class NewKeyframe:
     still: bool = False
 
 
+@dataclass(eq=False)
 class LocalMapper:
     """Extends the map by one keyframe at a time.
 
-    Args:
-        sparse_map, tracker: Map and followed corners, changed in place.
+    Attributes:
+        map, tracker: Map and followed corners, changed in place.
         adjuster: Bundle adjustment of the map.
         camera, T_rig_camera: The robot's camera.
         parameters: The robot's section of the configuration.
         max_depth_m: Largest depth that starts a point [m].
-
-    Attributes:
         found_old: Whether the newest keyframe found points again of keyframes older than the
             window.
     """
 
-    def __init__(
-        self,
-        sparse_map: SparseMap,
-        tracker: FeatureTracker,
-        adjuster: MapAdjuster,
-        camera: PinholeCamera,
-        T_rig_camera: SE3,
-        parameters: KeyframeSlam,
-        max_depth_m: float = np.inf,
-    ) -> None:
-        self._map = sparse_map
-        self._tracker = tracker
-        self._adjuster = adjuster
-        self._camera = camera
-        self._T_rig_camera = T_rig_camera
-        self._parameters = parameters
-        self._max_depth_m = max_depth_m
-        self.found_old = False
+    map: SparseMap
+    tracker: FeatureTracker
+    adjuster: MapAdjuster
+    camera: PinholeCamera
+    T_rig_camera: SE3
+    parameters: KeyframeSlam
+    max_depth_m: float = np.inf
+    found_old: bool = field(default=False, init=False)
 
     def insert(self, new: NewKeyframe, inertial: bool) -> F64 | None:
         """Add a keyframe; returns the covariance of its pose where it is known.
@@ -93,62 +82,62 @@ class LocalMapper:
             inertial: Whether the map is metric and gravity-aligned.
         """
         keyframe = self._append(new)
-        index = len(self._map.keyframes) - 1
+        index = len(self.map.keyframes) - 1
         if new.motion is not None:
-            self._adjuster.motions[index] = new.motion
+            self.adjuster.motions[index] = new.motion
         self._triangulate(keyframe)
         self.found_old = self._reuse(keyframe, new)
-        covariance = self._adjuster.adjust_window(inertial)
-        self._tracker.keep(~self._dropped(self._tracker.ids))
-        self._tracker.thin(CROWDED * self._parameters.corner_spacing_px)
+        covariance = self.adjuster.adjust_window(inertial)
+        self.tracker.keep(~self._dropped(self.tracker.ids))
+        self.tracker.thin(CROWDED * self.parameters.corner_spacing_px)
         self._detect(keyframe, index, new)
         return covariance
 
     def _append(self, new: NewKeyframe) -> Keyframe:
-        pixels = self._tracker.pixels.astype(np.float64)
+        pixels = self.tracker.pixels.astype(np.float64)
         keyframe = Keyframe(
             new.stamp_ns,
             new.image,
             new.state,
-            self._tracker.ids.copy(),
+            self.tracker.ids.copy(),
             pixels,
             self._inverse_depths(new, pixels),
             new.still,
         )
-        self._map.keyframes.append(keyframe)
+        self.map.keyframes.append(keyframe)
         return keyframe
 
     def _inverse_depths(self, new: NewKeyframe, pixels: F64) -> F64:
         if new.depth is None:
             return np.full(len(pixels), np.nan)
-        return inverse_depths_at(new.depth, pixels, self._max_depth_m)
+        return inverse_depths_at(new.depth, pixels, self.max_depth_m)
 
     def _dropped(self, ids: I64) -> Mask:
-        states = self._map.states[ids]
-        result: Mask = (states != CANDIDATE) & ~self._map.mapped(ids)
+        states = self.map.states[ids]
+        result: Mask = (states != CANDIDATE) & ~self.map.mapped(ids)
         return result
 
     def _triangulate(self, keyframe: Keyframe) -> None:
         """Place candidates whose rays from first sight and from here cross well."""
-        rows = np.flatnonzero(self._map.states[keyframe.ids] == CANDIDATE)
+        rows = np.flatnonzero(self.map.states[keyframe.ids] == CANDIDATE)
         if len(rows) == 0:
             return
         ids = keyframe.ids[rows]
-        origins = [self._map.keyframes[k] for k in self._map.origins[ids]]
+        origins = [self.map.keyframes[k] for k in self.map.origins[ids]]
         points = triangulate_pairs(
             self._cameras(origins),
-            self._map.first_pixels[ids],
+            self.map.first_pixels[ids],
             self._cameras([keyframe] * len(ids)),
             keyframe.pixels[rows],
-            self._camera,
+            self.camera,
         )
-        good = points.good & (points.parallax_rad > np.deg2rad(self._parameters.min_parallax_deg))
+        good = points.good & (points.parallax_rad > np.deg2rad(self.parameters.min_parallax_deg))
         good &= points.reprojection_px < MAX_TRIANGULATION_ERROR_PX
-        self._map.place(ids[good], points.points[good])
+        self.map.place(ids[good], points.points[good])
 
     def _cameras(self, keyframes: list[Keyframe]) -> tuple[F64, F64]:
         """(n, 3, 3) and (n, 3) `T_map_camera` of keyframes."""
-        T = self._T_rig_camera
+        T = self.T_rig_camera
         rotations = np.array([k.state.rotation for k in keyframes])
         positions = np.array([k.state.position for k in keyframes])
         return rotations @ T.rotation, rotations @ T.translation + positions
@@ -158,29 +147,29 @@ class LocalMapper:
 
         Returns whether there were any.
         """
-        old = len(self._map.keyframes) - 1 - self._parameters.window
-        if old <= 0 or self._parameters.reused_keyframes == 0:
+        old = len(self.map.keyframes) - 1 - self.parameters.window
+        if old <= 0 or self.parameters.reused_keyframes == 0:
             return False
-        T_map_camera = new.state.pose() @ self._T_rig_camera
-        ids = np.setdiff1d(self._map.begun_before(old), self._tracker.ids, assume_unique=True)
-        expected, inside = visible(self._map.positions[ids], T_map_camera, self._camera)
+        T_map_camera = new.state.pose() @ self.T_rig_camera
+        ids = np.setdiff1d(self.map.begun_before(old), self.tracker.ids, assume_unique=True)
+        expected, inside = visible(self.map.positions[ids], T_map_camera, self.camera)
         ids, expected = ids[inside], expected[inside]
         chosen = keyframes_in_view(
-            self._map,
+            self.map,
             range(old),
             T_map_camera,
-            self._T_rig_camera,
+            self.T_rig_camera,
             ids,
-            self._parameters.reused_keyframes,
+            self.parameters.reused_keyframes,
             MIN_REUSED,
         )
         found, pixels = find_in_keyframes(
-            self._map,
+            self.map,
             chosen,
             ids,
             new.image,
             expected,
-            self._parameters.patch_px,
+            self.parameters.patch_px,
             levels=1,
             search_px=REUSE_SEARCH_PX,
         )
@@ -191,41 +180,41 @@ class LocalMapper:
         if len(ids) < MIN_REUSED:
             return False
         fit = estimate_pose(
-            self._map.positions[ids],
+            self.map.positions[ids],
             pixels.astype(np.float64),
-            np.full(len(ids), self._parameters.corner_sigma_px),
-            self._camera,
-            new.state.pose() @ self._T_rig_camera,
+            np.full(len(ids), self.parameters.corner_sigma_px),
+            self.camera,
+            new.state.pose() @ self.T_rig_camera,
             rotation_sigma=0.01,
             position_sigma=0.1,
         )
         good = fit.inliers
         if good.sum() < MIN_REUSED or good.mean() < 0.5:
             return False
-        self._tracker.add(ids[good], pixels[good])
+        self.tracker.add(ids[good], pixels[good])
         pixels_kept = pixels[good].astype(np.float64)
         keyframe.see(ids[good], pixels_kept, self._inverse_depths(new, pixels_kept))
         return True
 
     def _detect(self, keyframe: Keyframe, index: int, new: NewKeyframe) -> None:
         """Follow new corners where there are none; with depth they are in the map at once."""
-        wanted = self._parameters.corners - len(self._tracker.ids)
+        wanted = self.parameters.corners - len(self.tracker.ids)
         corners = detect_corners(
             new.image,
-            self._tracker.pixels,
+            self.tracker.pixels,
             wanted,
-            self._parameters.corner_spacing_px,
-            None if new.depth is None else new.depth <= self._max_depth_m,
+            self.parameters.corner_spacing_px,
+            None if new.depth is None else new.depth <= self.max_depth_m,
         )
         pixels = corners.astype(np.float64)
-        ids = self._map.new_points(pixels, index)
+        ids = self.map.new_points(pixels, index)
         inverse_depths = self._inverse_depths(new, pixels)
         keyframe.see(ids, pixels, inverse_depths)
-        self._tracker.add(ids, corners)
+        self.tracker.add(ids, corners)
         known = np.isfinite(inverse_depths)
         if known.any():
             rays = np.column_stack([pixels[known], np.ones(known.sum())])
-            rays = rays @ np.linalg.inv(self._camera.matrix()).T
+            rays = rays @ np.linalg.inv(self.camera.matrix()).T
             points_camera = rays / inverse_depths[known, None]
-            T_map_camera = keyframe.state.pose() @ self._T_rig_camera
-            self._map.place(ids[known], T_map_camera @ points_camera)
+            T_map_camera = keyframe.state.pose() @ self.T_rig_camera
+            self.map.place(ids[known], T_map_camera @ points_camera)

@@ -6,6 +6,8 @@ is left after a long way through places not seen before.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 
 from airground.config import KeyframeSlam
@@ -40,37 +42,27 @@ MAX_LOST = 0.03
 """... and share of all sightings that may be lost by it: a wrong loop bends the map."""
 
 
+@dataclass(eq=False)
 class LoopCloser:
     """Recognizes old places and straightens the map by them.
 
-    Args:
-        sparse_map, tracker: Map and followed corners, changed in place.
+    Attributes:
+        map, tracker: Map and followed corners, changed in place.
         adjuster, recovery: Bundle adjustment and relocalization in the map.
         camera, T_rig_camera: The robot's camera.
         parameters: The robot's section of the configuration.
         max_depth_m: Largest depth to use [m].
     """
 
-    def __init__(
-        self,
-        sparse_map: SparseMap,
-        tracker: FeatureTracker,
-        adjuster: MapAdjuster,
-        recovery: Recovery,
-        camera: PinholeCamera,
-        T_rig_camera: SE3,
-        parameters: KeyframeSlam,
-        max_depth_m: float = np.inf,
-    ) -> None:
-        self._map = sparse_map
-        self._tracker = tracker
-        self._adjuster = adjuster
-        self._recovery = recovery
-        self._camera = camera
-        self._T_rig_camera = T_rig_camera
-        self._parameters = parameters
-        self._max_depth_m = max_depth_m
-        self._passed_over = 0
+    map: SparseMap
+    tracker: FeatureTracker
+    adjuster: MapAdjuster
+    recovery: Recovery
+    camera: PinholeCamera
+    T_rig_camera: SE3
+    parameters: KeyframeSlam
+    max_depth_m: float = np.inf
+    _passed_over: int = field(default=0, init=False)
 
     def close(self, depth: F32 | None, inertial: bool) -> bool:
         """Look whether the newest keyframe shows an old place; if so, correct the whole map.
@@ -82,43 +74,43 @@ class LoopCloser:
         Returns:
             Whether the map was corrected.
         """
-        first_recent = len(self._map.keyframes) - 1 - self._parameters.window
+        first_recent = len(self.map.keyframes) - 1 - self.parameters.window
         # Without depth or accelerometer the scale drifts, too, which this cannot mend.
         if first_recent <= 0 or (depth is None and not inertial):
             return False
         self._passed_over = (self._passed_over + 1) % EVERY
-        if self._passed_over or self._parameters.reused_keyframes == 0:
+        if self._passed_over or self.parameters.reused_keyframes == 0:
             return False
-        recent = self._map.seen_by(list(range(first_recent, len(self._map.keyframes))))
+        recent = self.map.seen_by(list(range(first_recent, len(self.map.keyframes))))
         # Keyframes that share points with recent ones are reached by projection.
-        shared = self._map.shared(recent)[:first_recent]
+        shared = self.map.shared(recent)[:first_recent]
         old = [int(k) for k in np.flatnonzero(shared < MIN_SHARED)]
         if not old:
             return False
-        found = self._recovery.again(old, recent)
+        found = self.recovery.again(old, recent)
         if found is None or not self._believable(found, old, inertial):
             return False
         return self._correct(found, self._best(found, old), depth, inertial)
 
     def _best(self, found: Found, old: list[int]) -> int:
         """The old keyframe that saw most of the points."""
-        shared = self._map.shared(found.ids)
+        shared = self.map.shared(found.ids)
         return max(old, key=lambda k: int(shared[k]))
 
     def _believable(self, found: Found, old: list[int], inertial: bool) -> bool:
         """Whether enough points agree and a robot can have drifted so far."""
         if len(found.ids) < MIN_AGREEING:
             return False
-        T_map_camera = self._map.keyframes[-1].state.pose() @ self._T_rig_camera
+        T_map_camera = self.map.keyframes[-1].state.pose() @ self.T_rig_camera
         correction = found.fit.T_map_camera @ T_map_camera.inverse()
-        expected = self._camera.project(T_map_camera.inverse() @ self._map.positions[found.ids])
+        expected = self.camera.project(T_map_camera.inverse() @ self.map.positions[found.ids])
         off_px = np.nan_to_num(np.linalg.norm(expected - found.pixels, axis=1), nan=np.inf)
         if np.median(off_px) < MIN_DRIFT_PX:
             return False
         tilt = np.arccos(min(1.0, correction.rotation[2, 2]))
         if inertial and tilt > MAX_TILT:
             return False
-        steps = [keyframe.state.position for keyframe in self._map.keyframes]
+        steps = [keyframe.state.position for keyframe in self.map.keyframes]
         way = np.linalg.norm(np.diff(steps[self._best(found, old) :], axis=0), axis=1).sum()
         shift = found.fit.T_map_camera.translation - T_map_camera.translation
         drifted = np.linalg.norm(shift) < DRIFT_M + DRIFT_SHARE * way
@@ -126,25 +118,25 @@ class LoopCloser:
 
     def _correct(self, found: Found, old: int, depth: F32 | None, inertial: bool) -> bool:
         """Pose graph, then bundle adjustment of everything; undone if the loop does not fit."""
-        newest = self._map.keyframes[-1]
-        before = MapSnapshot.of(self._map)
-        T_map_rig = found.fit.T_map_camera @ self._T_rig_camera.inverse()
-        T_old_newest = self._map.keyframes[old].state.pose().inverse() @ T_map_rig
-        last = len(self._map.keyframes) - 1
-        straighten(self._map, Edge(old, last, T_old_newest, float(len(found.ids))))
+        newest = self.map.keyframes[-1]
+        before = MapSnapshot.of(self.map)
+        T_map_rig = found.fit.T_map_camera @ self.T_rig_camera.inverse()
+        T_old_newest = self.map.keyframes[old].state.pose().inverse() @ T_map_rig
+        last = len(self.map.keyframes) - 1
+        straighten(self.map, Edge(old, last, T_old_newest, float(len(found.ids))))
         newest.see(found.ids, found.pixels, self._inverse_depths(found, depth))
-        self._adjuster.adjust_all(inertial)
-        fitting = np.isin(found.ids, newest.ids) & self._map.mapped(found.ids)
-        left = sum(len(keyframe.ids) for keyframe in self._map.keyframes) - fitting.sum()
+        self.adjuster.adjust_all(inertial)
+        fitting = np.isin(found.ids, newest.ids) & self.map.mapped(found.ids)
+        left = sum(len(keyframe.ids) for keyframe in self.map.keyframes) - fitting.sum()
         if fitting.mean() < MIN_FITTING or left < (1.0 - MAX_LOST) * before.sighting_count():
-            before.restore(self._map)
+            before.restore(self.map)
             return False
-        self._tracker.keep(np.isin(self._tracker.ids, newest.ids))
-        self._tracker.add(found.ids[fitting], found.pixels[fitting])
-        self._tracker.thin(CROWDED * self._parameters.corner_spacing_px)
+        self.tracker.keep(np.isin(self.tracker.ids, newest.ids))
+        self.tracker.add(found.ids[fitting], found.pixels[fitting])
+        self.tracker.thin(CROWDED * self.parameters.corner_spacing_px)
         return True
 
     def _inverse_depths(self, found: Found, depth: F32 | None) -> F64:
         if depth is None:
             return np.full(len(found.ids), np.nan)
-        return inverse_depths_at(depth, found.pixels, self._max_depth_m)
+        return inverse_depths_at(depth, found.pixels, self.max_depth_m)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -45,38 +46,30 @@ MAX_JOINED_S = 3.0
 Campos et al., "ORB-SLAM3", T-RO 2021)."""
 
 
+@dataclass(eq=False)
 class MapAdjuster:
     """Bundle adjustment over a sparse map.
 
-    Args:
-        sparse_map: Map, changed in place.
+    Attributes:
+        map: Map, changed in place.
         camera: Camera of all keyframes.
         T_rig_camera: Pose of the camera in the rig.
         parameters: The robot's section of the configuration.
         inverse_depth_sigma: Standard deviation of measured inverse depth [1/m].
 
-    Attributes:
         motions: Inertial motion before each keyframe, by its index, where known.
         settled_ns: Keyframes up to this stamp took part in adjusting the whole map long after
             they were made, and hold what their inertial motions had to tell.
     """
 
-    def __init__(
-        self,
-        sparse_map: SparseMap,
-        camera: PinholeCamera,
-        T_rig_camera: SE3,
-        parameters: KeyframeSlam,
-        inverse_depth_sigma: float,
-    ) -> None:
-        self.motions: dict[int, Preintegration] = {}
-        self.settled_ns = np.iinfo(np.int64).min
-        self._next_all = FIRST_ALL
-        self._map = sparse_map
-        self._camera = camera
-        self._T_rig_camera = T_rig_camera
-        self._parameters = parameters
-        self._inverse_depth_sigma = inverse_depth_sigma
+    map: SparseMap
+    camera: PinholeCamera
+    T_rig_camera: SE3
+    parameters: KeyframeSlam
+    inverse_depth_sigma: float
+    motions: dict[int, Preintegration] = field(default_factory=dict, init=False)
+    settled_ns: int = field(default=np.iinfo(np.int64).min, init=False)
+    _next_all: int = field(default=FIRST_ALL, init=False)
 
     def adjust_window(self, inertial: bool) -> F64 | None:
         """Move the newest keyframes and their points; older ones that saw them hold still.
@@ -87,8 +80,8 @@ class MapAdjuster:
         Returns:
             (6, 6) covariance of the newest keyframe's pose, where there is one.
         """
-        count = len(self._map.keyframes)
-        first_free = max(1, count - self._parameters.window)
+        count = len(self.map.keyframes)
+        first_free = max(1, count - self.parameters.window)
         free = list(range(first_free, count))
         if not free:
             return None
@@ -97,7 +90,7 @@ class MapAdjuster:
         if inertial and first_free == 1:
             # Tilt and biases of the beginning become known only by moving.
             roles[0] = Role.GAUGE
-        settings = Settings(self._parameters.iterations, relative_decrease=WINDOW_DECREASE)
+        settings = Settings(self.parameters.iterations, relative_decrease=WINDOW_DECREASE)
         return self._adjust(fixed + free, roles, inertial, settings)
 
     def adjust_all(self, inertial: bool) -> F64 | None:
@@ -108,7 +101,7 @@ class MapAdjuster:
         the first keyframe stays, since only there it is known where up is. Keyframes that
         culling left without their inertial motion stay in either case.
         """
-        keyframes = self._map.keyframes
+        keyframes = self.map.keyframes
         count = len(keyframes)
         roles = np.full(count, Role.FREE)
         roles[[keyframe.held for keyframe in keyframes]] = Role.FIXED
@@ -122,7 +115,7 @@ class MapAdjuster:
 
     def all_due(self) -> bool:
         """Whether the newest keyframe makes it time to adjust the whole map; to be asked once."""
-        due = self._map.made >= self._next_all
+        due = self.map.made >= self._next_all
         if due:
             grown = int(ALL_GROWTH * self._next_all)
             self._next_all = min(grown, self._next_all + MOST_BETWEEN_ALL)
@@ -130,7 +123,7 @@ class MapAdjuster:
 
     def can_skip(self, keyframe: int) -> bool:
         """Whether a keyframe may go without a loss of inertial information."""
-        if self._map.keyframes[keyframe + 1].stamp_ns <= self.settled_ns:
+        if self.map.keyframes[keyframe + 1].stamp_ns <= self.settled_ns:
             return True
         before, after = self.motions.get(keyframe), self.motions.get(keyframe + 1)
         if before is None or after is None:
@@ -153,23 +146,23 @@ class MapAdjuster:
                 self.motions[keyframe] = joined
                 return
         for neighbour in (keyframe - 1, keyframe + 1):
-            self._map.keyframes[neighbour].held |= inertial
+            self.map.keyframes[neighbour].held |= inertial
 
     def _holding(self, free: list[int]) -> list[int]:
         """Older keyframes that share the most points with the free ones, in order of time.
 
         The one just before the window is always among them: inertial motion starts there.
         """
-        shared = self._map.shared(self._map.seen_by(free))[: free[0]]
+        shared = self.map.shared(self.map.seen_by(free))[: free[0]]
         shared[-1] = np.iinfo(shared.dtype).max
-        best = np.argsort(-shared, kind="stable")[: self._parameters.fixed_keyframes]
+        best = np.argsort(-shared, kind="stable")[: self.parameters.fixed_keyframes]
         return sorted(int(k) for k in best if shared[k] > 0)
 
     def _adjust(
         self, chosen: list[int], roles: I64, inertial: bool, settings: Settings
     ) -> F64 | None:
         moving = [k for k, role in zip(chosen, roles, strict=True) if role != Role.FIXED]
-        seen = self._map.seen_by(moving)
+        seen = self.map.seen_by(moving)
         # Seen once in here, a point would go along with that view and say nothing.
         points = seen[self._views(chosen)[seen] >= 2]
         observations, rows = self._observations(chosen, points)
@@ -182,41 +175,41 @@ class MapAdjuster:
         result = adjust(
             self._states(chosen),
             roles,
-            self._map.positions[points],
+            self.map.positions[points],
             observations,
             factors,
-            self._camera,
-            self._T_rig_camera,
+            self.camera,
+            self.T_rig_camera,
             settings,
         )
         self._apply(chosen, points, rows, result)
-        everywhere = self._views(range(len(self._map.keyframes)))
-        self._map.drop(seen[everywhere[seen] < 2])
+        everywhere = self._views(range(len(self.map.keyframes)))
+        self.map.drop(seen[everywhere[seen] < 2])
         return result.covariance
 
     def _views(self, keyframes: Iterable[int]) -> I64:
         """(P,) how many of the keyframes saw each point."""
-        views = np.zeros(len(self._map), np.int64)
+        views = np.zeros(len(self.map), np.int64)
         for k in keyframes:
-            views[self._map.keyframes[k].ids] += 1
+            views[self.map.keyframes[k].ids] += 1
         return views
 
     def _states(self, chosen: list[int]) -> States:
-        states = [self._map.keyframes[k].state for k in chosen]
+        states = [self.map.keyframes[k].state for k in chosen]
         return States(
             rotations=np.array([s.rotation for s in states]),
             positions=np.array([s.position for s in states]),
             velocities=np.array([s.velocity for s in states]),
             gyro_biases=np.array([s.gyro_bias for s in states]),
             accelerometer_biases=np.array([s.accelerometer_bias for s in states]),
-            still=np.array([self._map.keyframes[k].still for k in chosen]),
+            still=np.array([self.map.keyframes[k].still for k in chosen]),
         )
 
     def _observations(self, chosen: list[int], points: I64) -> tuple[Observations, list[I64]]:
         """All sightings of the points, and which rows of each keyframe they are."""
-        row_of = np.full(len(self._map), -1)
+        row_of = np.full(len(self.map), -1)
         row_of[points] = np.arange(len(points))
-        keyframes = [self._map.keyframes[k] for k in chosen]
+        keyframes = [self.map.keyframes[k] for k in chosen]
         rows = [np.flatnonzero(row_of[keyframe.ids] >= 0) for keyframe in keyframes]
         pairs = list(zip(keyframes, rows, strict=True))
         inverse_depths = np.concatenate([k.inverse_depths[r] for k, r in pairs])
@@ -224,29 +217,29 @@ class MapAdjuster:
             keyframes=np.repeat(np.arange(len(chosen)), [len(r) for r in rows]),
             points=np.concatenate([row_of[k.ids[r]] for k, r in pairs]),
             pixels=np.concatenate([k.pixels[r] for k, r in pairs]),
-            sigmas_px=np.full(len(inverse_depths), self._parameters.corner_sigma_px),
+            sigmas_px=np.full(len(inverse_depths), self.parameters.corner_sigma_px),
             inverse_depths=inverse_depths,
-            inverse_depth_sigmas=np.full(len(inverse_depths), self._inverse_depth_sigma),
+            inverse_depth_sigmas=np.full(len(inverse_depths), self.inverse_depth_sigma),
         ), rows
 
     def _apply(self, chosen: list[int], points: I64, rows: list[I64], result: Adjustment) -> None:
         """Take over the result and drop the observations that do not fit it."""
         states = result.states
         for n, k in enumerate(chosen):
-            self._map.keyframes[k].state = RigState(
+            self.map.keyframes[k].state = RigState(
                 states.rotations[n],
                 states.positions[n],
                 states.velocities[n],
                 states.gyro_biases[n],
                 states.accelerometer_biases[n],
             )
-        self._map.positions[points] = result.points
-        limit = MAX_RESIDUAL_SIGMAS * self._parameters.corner_sigma_px
+        self.map.positions[points] = result.points
+        limit = MAX_RESIDUAL_SIGMAS * self.parameters.corner_sigma_px
         # Written so that NaN, a point behind the camera, counts as wrong.
         wrong = ~(result.residuals_px < limit)
         bounds = np.cumsum([0] + [len(r) for r in rows])
         for n, k in enumerate(chosen):
-            keyframe = self._map.keyframes[k]
+            keyframe = self.map.keyframes[k]
             bad = np.zeros(len(keyframe.ids), bool)
             bad[rows[n]] = wrong[bounds[n] : bounds[n + 1]]
             keyframe.forget(bad)

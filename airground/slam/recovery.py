@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -44,31 +44,25 @@ class Found:
     fit: PoseFit
 
 
+@dataclass(eq=False)
 class Recovery:
     """Finds the pose of an image without that of the image before.
 
-    Args:
-        sparse_map: Map to relocalize in.
+    Attributes:
+        map: Map to relocalize in.
         camera, T_rig_camera: The robot's camera.
         parameters: The robot's section of the configuration.
     """
 
-    def __init__(
-        self,
-        sparse_map: SparseMap,
-        camera: PinholeCamera,
-        T_rig_camera: SE3,
-        parameters: KeyframeSlam,
-    ) -> None:
-        self._map = sparse_map
-        self._camera = camera
-        self._T_rig_camera = T_rig_camera
-        self._parameters = parameters
-        self._index = KeyframeIndex()
+    map: SparseMap
+    camera: PinholeCamera
+    T_rig_camera: SE3
+    parameters: KeyframeSlam
+    _index: KeyframeIndex = field(default_factory=KeyframeIndex, init=False)
 
     def add_keyframe(self) -> None:
         """Make the newest keyframe known."""
-        keyframe = self._map.keyframes[-1]
+        keyframe = self.map.keyframes[-1]
         self._index.add(keyframe.stamp_ns, keyframe.image, keyframe.ids, keyframe.pixels)
 
     def forget(self, stamp_ns: int) -> None:
@@ -93,20 +87,20 @@ class Recovery:
             without: Numbers of points not to look for.
         """
         least = MIN_FOUND_TURN_KNOWN if turn_known else MIN_FOUND
-        candidates = list(range(len(self._map.keyframes)) if among is None else among)
-        ids = np.setdiff1d(self._map.seen_by(candidates), without)
-        expected, inside = visible(self._map.positions[ids], T_map_camera, self._camera)
+        candidates = list(range(len(self.map.keyframes)) if among is None else among)
+        ids = np.setdiff1d(self.map.seen_by(candidates), without)
+        expected, inside = visible(self.map.positions[ids], T_map_camera, self.camera)
         ids, expected = ids[inside], expected[inside]
-        seen = (self._map, candidates, T_map_camera, self._T_rig_camera, ids, KEYFRAMES, least)
+        seen = (self.map, candidates, T_map_camera, self.T_rig_camera, ids, KEYFRAMES, least)
         chosen = keyframes_in_view(*seen) or keyframes_in_view(*seen, MAX_TURN_DEG)
         again, found = find_in_keyframes(
-            self._map, chosen, ids, image, expected, self._parameters.patch_px, LEVELS
+            self.map, chosen, ids, image, expected, self.parameters.patch_px, LEVELS
         )
         return self._agreed(again, found, T_map_camera, least, TURN_SIGMA if turn_known else None)
 
     def anywhere(self, image: U8) -> Found | None:
         """Compare the image with all keyframes."""
-        found = self._index.find(image, self._camera, self._places)
+        found = self._index.find(image, self.camera, self._places)
         # Descriptors find the place, patches the pixel.
         return None if found is None else self.near(image, found.fit.T_map_camera)
 
@@ -117,34 +111,34 @@ class Recovery:
             among: The old keyframes.
             without: Numbers of points that do not count.
         """
-        newest = self._map.keyframes[-1]
-        stamps = [self._map.keyframes[k].stamp_ns for k in among]
+        newest = self.map.keyframes[-1]
+        stamps = [self.map.keyframes[k].stamp_ns for k in among]
         alike = self._index.resembling(newest.stamp_ns, stamps)
         if not alike:
             return None
         image = newest.image
-        found = self._index.find(image, self._camera, self._places, alike)
+        found = self._index.find(image, self.camera, self._places, alike)
         if found is None:
             return None
         return self.near(image, found.fit.T_map_camera, among=among, without=without)
 
     def _places(self, ids: I64) -> F64:
         """(n, 3) positions of points, NaN where they have none."""
-        return np.where(self._map.mapped(ids)[:, None], self._map.positions[ids], np.nan)
+        return np.where(self.map.mapped(ids)[:, None], self.map.positions[ids], np.nan)
 
     def _agreed(
         self, ids: I64, pixels: F32, T_map_camera: SE3, least: int, rotation_sigma: float | None
     ) -> Found | None:
         """The pose by points that were found, if they agree."""
-        placed = self._map.mapped(ids)
+        placed = self.map.mapped(ids)
         ids, seen = ids[placed], pixels[placed].astype(np.float64)
         if len(ids) < least:
             return None
         fit = estimate_pose(
-            self._map.positions[ids],
+            self.map.positions[ids],
             seen,
-            np.full(len(ids), self._parameters.corner_sigma_px),
-            self._camera,
+            np.full(len(ids), self.parameters.corner_sigma_px),
+            self.camera,
             T_map_camera,
             rotation_sigma=rotation_sigma,
             position_sigma=None,
