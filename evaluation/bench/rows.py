@@ -52,7 +52,7 @@ REFINEMENT, INPUT = "Pose refinement", "Input"
 
 def _ours(metric: str, title: str, group: str) -> TimedStage:
     """A stage that Table I does not time."""
-    return TimedStage(metric, title, group, None, "", in_summary=False)
+    return TimedStage(metric, title, group, None, "")
 
 
 ROWS = (

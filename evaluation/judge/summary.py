@@ -28,7 +28,6 @@ from evaluation.judge.readings import median, rate, rate_of, real_time_factor, s
 from evaluation.judge.samples import localization, located, refined
 from evaluation.setup.checked_json import Count, Number, Part, Share, number, read_checked
 from evaluation.setup.condition import Condition
-from evaluation.setup.published import TABLE_I
 from evaluation.setup.run_info import RunInfo
 from evaluation.table.intervals import Quantiles, quantiles
 from evaluation.table.limits import LOCATED_M, NEAR_M
@@ -176,7 +175,7 @@ def build_summary(table: ResultTable, condition: Condition, run: RunInfo) -> Sum
         localization=_localization(measured),
         refinement=_refinement(measured),
         timing_ms=TimingTable(
-            **{s.metric: stage_timing(measured, s.metric) for s in TABLE_I if s.in_summary}
+            **{stage: stage_timing(measured, stage) for stage in TimingTable.model_fields}
         ),
         real_time_factor=number(real_time_factor(measured)),
         realtime=live_summary(measured),

@@ -134,40 +134,32 @@ def cores() -> Finding:
 
 
 def memory() -> Finding:
-    pages = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    gib = pages / 2**30
-    if gib < MIN_MEMORY_GIB:
-        remedy = f"have at least {MIN_MEMORY_GIB:g} GiB of memory"
-        return Finding("memory", Health.POOR, f"{gib:.1f} GiB", remedy)
-    return Finding("memory", Health.FINE, f"{gib:.1f} GiB")
+    gib = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") / 2**30
+    remedy = f"have at least {MIN_MEMORY_GIB:g} GiB of memory"
+    return _found("memory", gib >= MIN_MEMORY_GIB, f"{gib:.1f} GiB", remedy, Health.POOR)
 
 
 def disk(folder: Path) -> Finding:
     gib = shutil.disk_usage(folder).free / 2**30
+    remedy = f"free {MIN_DISK_GIB:g} GiB: a minute of recording takes about 2 GiB"
     detail = f"{gib:.1f} GiB free in {folder}"
-    if gib < MIN_DISK_GIB:
-        remedy = f"free {MIN_DISK_GIB:g} GiB: a minute of recording takes about 2 GiB"
-        return Finding("disk", Health.POOR, detail, remedy)
-    return Finding("disk", Health.FINE, detail)
+    return _found("disk", gib >= MIN_DISK_GIB, detail, remedy, Health.POOR)
 
 
 def libraries() -> Iterator[Finding]:
     for library in SYSTEM_LIBRARIES:
-        if library.present():
-            yield Finding(library.soname, Health.FINE, "found")
-            continue
-        health = Health.BROKEN if library.required else Health.POOR
+        fine = library.present()
+        detail = "found" if fine else f"needed by {library.needed_by}"
         remedy = f"install {library.package} (sudo apt-get install {library.package})"
-        yield Finding(library.soname, health, f"needed by {library.needed_by}", remedy)
+        otherwise = Health.BROKEN if library.required else Health.POOR
+        yield _found(library.soname, fine, detail, remedy, otherwise)
 
 
 def pyopengl(version: str) -> Finding:
     """pyrender asks for a PyOpenGL on which MuJoCo's EGL fails."""
     numbers = tuple(int(part) for part in version.split(".")[:3] if part.isdigit())
-    if numbers < WORKING_PYOPENGL:
-        remedy = "install 3.1.10 or newer without dependencies: pip install --no-deps PyOpenGL"
-        return Finding("PyOpenGL", Health.BROKEN, version, remedy)
-    return Finding("PyOpenGL", Health.FINE, version)
+    remedy = "install 3.1.10 or newer without dependencies: pip install --no-deps PyOpenGL"
+    return _found("PyOpenGL", numbers >= WORKING_PYOPENGL, version, remedy)
 
 
 def rendering() -> Iterator[Finding]:
@@ -191,9 +183,13 @@ def rendering() -> Iterator[Finding]:
 
 def threading() -> Finding:
     works, said = _try(NUMBA_LOOP)
-    if works:
-        return Finding("numba", Health.FINE, said)
-    return Finding("numba", Health.BROKEN, said, "install libgomp1, then the locked packages anew")
+    return _found("numba", works, said, "install libgomp1, then the locked packages anew")
+
+
+def _found(
+    what: str, fine: bool, detail: str, remedy: str, otherwise: Health = Health.BROKEN
+) -> Finding:
+    return Finding(what, Health.FINE, detail) if fine else Finding(what, otherwise, detail, remedy)
 
 
 def _try(script: str, **environment: str) -> tuple[bool, str]:

@@ -24,20 +24,14 @@ RESET_HIGH_WATER_MARK = "5"
 
 def peak_memory_mib() -> float:
     """The most memory that this process held at one time [MiB]."""
-    mark_mib = _status_mib("VmHWM")
-    if mark_mib is None:
-        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    return mark_mib
+    most_mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return _status_mib("VmHWM") or most_mib
 
 
 def resident_mib(processes: Iterable[int]) -> float | None:
-    """Memory that processes hold now, shared pages counted once [MiB].
+    """Memory that processes (PID) hold now, shared pages counted once [MiB].
 
-    Args:
-        processes: Their numbers (PID).
-
-    Returns:
-        The sum; None where the system does not count it.
+    None where the system does not count it.
     """
     try:
         return sum(psutil.Process(pid).memory_full_info().pss for pid in processes) / 2**20

@@ -37,11 +37,7 @@ class Step:
     """
 
     def __init__(
-        self,
-        what: str,
-        total: float | None = None,
-        unit: str = "",
-        done: float = 0.0,
+        self, what: str, total: float | None = None, unit: str = "", done: float = 0.0
     ) -> None:
         self.what, self.total, self.unit, self.done = what, total, unit, done
         self.note = ""
@@ -49,7 +45,6 @@ class Step:
         self._started = time.monotonic()
 
     def advance(self, amount: float = 1.0) -> None:
-        """Add to what is done."""
         self.done += amount
 
     def move_to(self, done: float, total: float | None = None) -> None:
@@ -74,7 +69,6 @@ class Step:
 
     @property
     def elapsed_s(self) -> float:
-        """Time since the step began [s]."""
         return time.monotonic() - self._started
 
     @property
@@ -108,10 +102,7 @@ _due: float | None = None  # when the command ought to be done, by time.monotoni
 
 @contextmanager
 def step(
-    what: str,
-    total: float | None = None,
-    unit: str = "",
-    done: float = 0.0,
+    what: str, total: float | None = None, unit: str = "", done: float = 0.0
 ) -> Iterator[Step]:
     """A step that is shown, inside `shown`, until the block ends; arguments as of `Step`."""
     opened = Step(what, total, unit, done)
@@ -127,12 +118,7 @@ def step(
 
 
 def announce(what: str, expected_s: float | None = None) -> None:
-    """Say at the start of a command, in one line, what it does and how long that takes.
-
-    Args:
-        what: Work to be done, with its extent.
-        expected_s: Duration to be expected [s]; None if it cannot be known.
-    """
+    """Say in one line what a command does and how long that takes [s], None if unknown."""
     global _due
     if _display is not None:
         _due = None if expected_s is None else time.monotonic() + expected_s

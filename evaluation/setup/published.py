@@ -20,7 +20,6 @@ class Published:
 
 
 SEQUENCES = Published(41, "sequences of 12 depth maps", "Sec. VIII-C, Fig. 11")
-ITERATIONS = Published(12, "iterations", "Fig. 11")
 WITHIN_0_50_M_FIRST = Published(0.65, "of sequences within 0.5 m at iteration 1", "Sec. VIII-C")
 WITHIN_0_25_M_FOURTH = Published(0.89, "of sequences within 0.25 m after 4", "Sec. VIII-C")
 """89 % of 41 is no whole number (37 of 41 is 90.2 %)."""
@@ -34,7 +33,6 @@ START_NOISE_DEG = Published(3.0, "deg", "Sec. VIII-D")
 
 MAV_RMSE_M = Published(0.012, "m, RMS", "Sec. VIII-A, Fig. 9")
 GROUND_RMSE_M = Published(0.038, "m, RMS over 7.7 m", "Sec. VIII-A, Fig. 10")
-FRAMES_PER_MAP = Published(300, "frames at 30 Hz", "Sec. VIII-D")
 
 
 @dataclass(frozen=True)
@@ -45,9 +43,8 @@ class TimedStage:
         metric: Its name in the results table and in `summary.json`.
         title: Its name for readers.
         group: Its heading in Table I.
-        published_ms: The paper's average [ms], or None where the paper has none.
+        published_ms: The paper's average [ms]; None where it has none, nor `summary.json`.
         processor: Processor of the paper's measurement.
-        in_summary: Whether `summary.json` has it.
     """
 
     metric: str
@@ -55,22 +52,21 @@ class TimedStage:
     group: str
     published_ms: float | None
     processor: str
-    in_summary: bool = True
 
 
 TABLE_I = (
     TimedStage("mono_slam", "Monocular SLAM, a frame", "Egomotion", 14, "CPU"),
     TimedStage("rgbd_slam", "RGB-D SLAM, a frame", "Egomotion", 15, "CPU"),
-    TimedStage("ground_map", "Add a keyframe to the ground map", "Egomotion", None, "", False),
+    TimedStage("ground_map", "Add a keyframe to the ground map", "Egomotion", None, ""),
     TimedStage("add_frame", "Add a frame, 200 hypotheses", "Dense reconstruction", 5, "GPU"),
-    TimedStage("depth_map", "Finish a depth map", "Dense reconstruction", None, "", False),
+    TimedStage("depth_map", "Finish a depth map", "Dense reconstruction", None, ""),
     TimedStage("distance_field", "Distance field", "Dense reconstruction", 21, "GPU"),
     TimedStage("fusion", "Fusion, 8 iterations", "Dense reconstruction", 800, "GPU"),
     TimedStage("ray_cast", "Ray casting", "Dense reconstruction", 15, "GPU"),
-    TimedStage("height_map", "Height maps", "Global localization", None, "", False),
+    TimedStage("height_map", "Height maps", "Global localization", None, ""),
     TimedStage("cost_map", "Full cost map", "Global localization", 9143, "CPU"),
     TimedStage("particles", "200 particles", "Global localization", 38, "CPU"),
     TimedStage("icp", "ICP alignment", "Pose refinement", 462, "CPU"),
-    TimedStage("augmentation", "Augment the map", "Map augmentation", None, "", False),
+    TimedStage("augmentation", "Augment the map", "Map augmentation", None, ""),
 )
 PLATFORM = "8-core i7 at 2.4 GHz with a Quadro K2000M GPU (384 CUDA cores), Table I"

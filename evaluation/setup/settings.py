@@ -163,12 +163,7 @@ def parsed_value(text: str) -> Any:
 
 
 def with_value(
-    config: AnyConfig,
-    section: str,
-    key: str,
-    value: Any,
-    origin: str,
-    unused: Collection[str] = (),
+    config: AnyConfig, section: str, key: str, value: Any, origin: str, unused: Collection[str] = ()
 ) -> AnyConfig:
     """`config` with one value changed and validated.
 

@@ -27,21 +27,8 @@ class PoseNoise:
     white_m: float = 0.0
     white_deg: float = 0.0
 
-    def describe(self) -> str:
-        """For captions: "exact poses", or what was added to them."""
-        parts = []
-        if self.drift_mav_m or self.drift_ground_m:
-            parts.append(
-                f"drift {self.drift_mav_m * 100:g} cm (MAV) and "
-                f"{self.drift_ground_m * 100:g} cm (ground) RMS"
-            )
-        if self.white_m or self.white_deg:
-            parts.append(f"noise {self.white_m * 1000:g} mm and {self.white_deg:g} deg a frame")
-        return "oracle poses, " + (" and ".join(parts) or "exact")
-
 
 EXACT = PoseNoise()
-
 PAPER_DRIFT = PoseNoise(drift_mav_m=0.012, drift_ground_m=0.038)
 """What the paper measured for its SLAM (Fig. 9, 10)."""
 
@@ -73,7 +60,6 @@ class Given:
 
 NOTHING = Given()
 
-
 Poses = Literal["slam", "oracle", "slam, exact mav", "slam, exact ground"]
 """Where poses come from: each robot's own SLAM, or the truth for both or one of them."""
 
@@ -102,7 +88,6 @@ class Setup:
     given: Given = NOTHING
 
     def front_ends(self) -> dict[str, FrontEndName]:
-        """Who tracks "mav" and "ground"."""
         oracles = {"oracle": ROBOTS, "slam, exact mav": {"mav"}, "slam, exact ground": {"ground"}}
         way: dict[str, FrontEndName] = dict.fromkeys(ROBOTS, "slam")
         way |= dict.fromkeys(oracles.get(self.poses, set()), "oracle")
@@ -163,16 +148,3 @@ def with_companions(primary: Setup, few: bool = False) -> list[Setup]:
         companions += [Setup(best), Setup(with_localization(best, heading="search"))]
     known = (primary.config, primary.poses, primary.noise)
     return [primary, *(o for o in companions if (o.config, o.poses, o.noise) != known)]
-
-
-def grouped_by_maps(setups: list[Setup]) -> list[list[Setup]]:
-    """Setups that share their maps, together: mapping is the expensive part."""
-    groups: list[list[Setup]] = []
-    for setup in setups:
-        for group in groups:
-            if setup.maps_like(group[0]):
-                group.append(setup)
-                break
-        else:
-            groups.append([setup])
-    return groups

@@ -137,7 +137,6 @@ def least_two_sample_p(before: int, after: int) -> float:
 
 
 def _untested(value: float) -> Effect:
-    """An effect of which chance and interval are unknown."""
     return Effect(value, -np.inf, np.inf, 1.0)
 
 

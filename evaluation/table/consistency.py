@@ -67,9 +67,7 @@ def level_alignment(estimates: Sequence[SE3], truths: Sequence[SE3]) -> SE3:
 
 def _usable(covariance: NDArray[np.float64]) -> bool:
     """Whether a covariance can be inverted."""
-    if not np.isfinite(covariance).all():
-        return False
-    return bool(np.linalg.eigvalsh(covariance)[0] > 0)
+    return bool(np.isfinite(covariance).all() and np.linalg.eigvalsh(covariance)[0] > 0)
 
 
 def _error(estimate: SE3, true: SE3) -> NDArray[np.float64]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from airground.core.belief import Alignment, Belief
 from evaluation.setup.condition import Condition
 from evaluation.table.rows import Row
@@ -48,34 +50,21 @@ class RowWriter:
     ) -> None:
         """A filter's belief after one aerial map, and its error (Fig. 11, 12).
 
-        Args:
-            belief: Belief of the filter.
-            error: Its error against the truth.
-            squared_mahalanobis: The error in the measure of the belief's covariance.
-            sequence, iteration: Number of the sequence, and of the aerial map in it.
-            origin: How it was made, where not by the pipeline itself; note of the error's row.
+        `origin` states how it was made, where not by the pipeline itself.
         """
-        for metric, value, unit in (
-            ("error_m", error.horizontal_m, "m"),
-            ("error_deg", error.rotation_deg, "deg"),
-            ("spread_m", belief.spread_m, "m"),
-            ("squared_mahalanobis", squared_mahalanobis, ""),
-            ("converged", belief.converged, ""),
-        ):
-            note = {"converged": belief.refusal, "error_m": origin}.get(metric, "")
-            where = {"sequence": sequence, "iteration": iteration}
-            self.add("localization", metric, value, unit, note=note, **where)
+        add = partial(self.add, "localization", sequence=sequence, iteration=iteration)
+        add("error_m", error.horizontal_m, "m", note=origin)
+        add("error_deg", error.rotation_deg, "deg")
+        add("spread_m", belief.spread_m, "m")
+        add("squared_mahalanobis", squared_mahalanobis, "")
+        add("converged", belief.converged, "", note=belief.refusal)
 
     def add_no_belief(self, reason: str, sequence: int, iteration: int) -> None:
         """An aerial map that was not made: counts as failed."""
-        nothing = float("nan")
-        for metric, value, unit in (
-            ("error_m", nothing, "m"),
-            ("error_deg", nothing, "deg"),
-            ("converged", 0.0, ""),
-        ):
-            where = {"sequence": sequence, "iteration": iteration}
-            self.add("localization", metric, value, unit, note=reason, **where)
+        add = partial(self.add, "localization", sequence=sequence, iteration=iteration, note=reason)
+        add("error_m", float("nan"), "m")
+        add("error_deg", float("nan"), "deg")
+        add("converged", 0.0, "")
 
     def add_alignment(
         self,

@@ -51,7 +51,6 @@ class AnswerLog(Sequence[TrackedPose]):
             self.append(answer)
 
     def append(self, answer: TrackedPose) -> None:
-        """Keep one more."""
         at = self._count % RECORDS_A_CHUNK
         if at == 0:
             self._chunks.append(np.zeros(RECORDS_A_CHUNK, _RECORD))
@@ -128,6 +127,10 @@ class FrontEndLog:
     answers: AnswerLog = field(default_factory=AnswerLog)
     durations_ms: list[float] = field(default_factory=list)
 
+    def stamps_ns(self) -> NDArray[np.int64]:
+        """(N,) stamp of each image."""
+        return np.array([answer.stamp_ns for answer in self.answers], np.int64)
+
     def live_poses(self) -> list[tuple[int, SE3]]:
         """Stamp and live pose of each tracked image."""
         return [(a.stamp_ns, a.T_map_camera) for a in self.answers if a.T_map_camera is not None]
@@ -150,13 +153,11 @@ class WatchedFrontEnd(FrontEndLog, Generic[Image]):
         self._imu_s = 0.0
 
     def add_imu(self, samples: ImuSamples) -> None:
-        """Pass inertial measurements on."""
         started = self._clock()
         self._inner.add_imu(samples)
         self._imu_s += self._clock() - started
 
     def track(self, image: Image) -> TrackedPose:
-        """Pass an image on."""
         started = self._clock()
         answer = self._inner.track(image)
         self.durations_ms.append(1e3 * (self._clock() - started + self._imu_s))
@@ -165,11 +166,9 @@ class WatchedFrontEnd(FrontEndLog, Generic[Image]):
         return answer
 
     def finish(self) -> None:
-        """Let it finish."""
         self._inner.finish()
 
     def trajectory(self) -> Trajectory | None:
-        """The current poses of all images."""
         return self._inner.trajectory()
 
     def log(self) -> FrontEndLog:

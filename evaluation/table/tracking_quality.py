@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.core.se3 import SE3
 from evaluation.table.consistency import consistency
@@ -50,26 +49,18 @@ def _over_time(
     front_end: FrontEndLog, poses: list[tuple[int, SE3]], true_pose: Callable[[int], SE3]
 ) -> Iterator[tuple[float, float]]:
     """Seconds since the first image and the error then, NaN where there was no pose."""
-    stamps = np.array([stamp for stamp, _ in poses], np.int64)
-    errors = aligned_errors(poses, true_pose)
-    error_at = dict(zip(stamps.tolist(), errors.tolist(), strict=True))
-    all_stamps = np.array([answer.stamp_ns for answer in front_end.answers], np.int64)
-    for stamp in _spaced(all_stamps):
-        yield (stamp - int(all_stamps[0])) * 1e-9, error_at.get(stamp, float("nan"))
-
-
-def _spaced(stamps_ns: NDArray[np.int64]) -> list[int]:
-    """The first stamp of each interval."""
-    if len(stamps_ns) == 0:
-        return []
-    _, first = np.unique((stamps_ns - stamps_ns[0]) // DRAWN_EVERY_NS, return_index=True)
-    return stamps_ns[first].tolist()
+    errors = aligned_errors(poses, true_pose).tolist()
+    error_at = dict(zip((stamp for stamp, _ in poses), errors, strict=True))
+    stamps = front_end.stamps_ns()
+    _, drawn = np.unique((stamps - stamps[:1]) // DRAWN_EVERY_NS, return_index=True)
+    for stamp in stamps[drawn].tolist():
+        yield (stamp - int(stamps[0])) * 1e-9, error_at.get(stamp, float("nan"))
 
 
 def _add_share(
     out: RowWriter, robot: str, front_end: FrontEndLog, true_pose: Callable[[int], SE3]
 ) -> None:
-    stamps = np.array([answer.stamp_ns for answer in front_end.answers], np.int64)
+    stamps = front_end.stamps_ns()
     motion_ns = first_motion_ns(stamps, true_pose) if len(stamps) else 0
     share = tracked_share(front_end.answers, motion_ns)
     out.add(STAGE, f"{robot}_tracked_fraction", share.fraction, "")

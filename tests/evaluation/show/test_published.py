@@ -1,5 +1,6 @@
 """What is said to be published must stand in the paper as it is read here."""
 
+from evaluation.judge.summary import TimingTable
 from evaluation.setup import published
 
 
@@ -12,5 +13,5 @@ def test_table_one_is_the_papers() -> None:
 
 
 def test_every_published_stage_is_in_the_summary() -> None:
-    for stage in published.TABLE_I:
-        assert stage.in_summary == (stage.published_ms is not None)
+    stages = {s.metric for s in published.TABLE_I if s.published_ms is not None}
+    assert set(TimingTable.model_fields) == stages
