@@ -18,7 +18,7 @@ class AugmentedMap:
     """One cloud in the frame `ground` with the robot that saw each point.
 
     Attributes:
-        cloud_ground: Cloud of all points in the frame `ground`.
+        cloud_ground: Cloud of all points.
         sources: (N,) uint8, a `Source` each.
     """
 
@@ -26,18 +26,14 @@ class AugmentedMap:
     sources: U8
 
     def __post_init__(self) -> None:
-        n = len(self.cloud_ground)
-        freeze(self, "sources", (n,), np.uint8)
+        freeze(self, "sources", (len(self.cloud_ground),), np.uint8)
 
 
 class Augmentation:
-    """Gathers the aerial surfaces that were aligned.
+    """Gathers the aerial surfaces that were aligned, averaged over cubes of side `voxel_m`.
 
     They are kept in the MAV's own map and moved to `ground` by the newest alignment, so
     that a better alignment improves what was added before.
-
-    Args:
-        voxel_m: Aerial points are averaged over cubes of this side [m].
     """
 
     def __init__(self, voxel_m: float) -> None:

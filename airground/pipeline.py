@@ -42,12 +42,7 @@ from airground.tracking import TrackedFrame
 
 
 class Mapping:
-    """The middle of Figure 4: what both robots' maps hold, made from tracked frames.
-
-    Args:
-        config: The pipeline's parameters.
-        mav, ground: Nominal calibration of each robot.
-    """
+    """The middle of Figure 4: what both robots' maps hold, made from tracked frames."""
 
     def __init__(self, config: Config, mav: RobotCalibration, ground: RobotCalibration) -> None:
         self._dense = DenseReconstruction(mav.camera, config)

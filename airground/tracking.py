@@ -38,8 +38,8 @@ class TrackedFrame:
     """One image, and what the mapper receives with it.
 
     Attributes:
-        image: Image of the camera.
-        pose: Answer of the front end to this image.
+        image: Image of the robot's camera.
+        pose: Answer of the front end to it.
         north_rad: Direction of magnetic north in the robot's map [rad]; None while unknown.
         trajectory: Newest poses of all images so far, of the ground robot and only where this
             image corrected its map; else None.
@@ -52,23 +52,15 @@ class TrackedFrame:
 
     @property
     def robot(self) -> Source:
-        """The robot that took the image."""
         return Source.MAV if isinstance(self.image, MavImage) else Source.GROUND
 
     @property
     def stamp_ns(self) -> int:
-        """Stamp of the image [ns]."""
         return self.image.stamp_ns
 
 
 class RobotTracker:
-    """Poses of one robot, and the direction of magnetic north in its map.
-
-    Args:
-        robot: The robot.
-        calibration: Nominal calibration of its sensors.
-        front_end: Front end that tracks its camera.
-    """
+    """Poses of one robot, and the direction of magnetic north in its map."""
 
     def __init__(
         self, robot: Source, calibration: RobotCalibration, front_end: FrontEnd[Any]
@@ -109,12 +101,7 @@ class RobotTracker:
 
 
 class Trackers:
-    """Both robots' trackers, fed from one stream of messages.
-
-    Args:
-        mav, ground: Nominal calibration of each robot.
-        front_ends: Front ends of both robots.
-    """
+    """Both robots' trackers, fed from one stream of messages; `mav`, `ground`: calibrations."""
 
     def __init__(
         self, mav: RobotCalibration, ground: RobotCalibration, front_ends: FrontEnds

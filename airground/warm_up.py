@@ -28,12 +28,7 @@ POINTS_PER_SIDE = 60
 
 
 def warm_up_mapping(config: Config, rng: np.random.Generator) -> None:
-    """Compile everything above tracking; `slam.warm_up` does the same for tracking.
-
-    Args:
-        config: Configuration that will run.
-        rng: Source of the data to compile with.
-    """
+    """Compile everything above tracking; `slam.warm_up` does the same for tracking."""
     warm_up_dense(config)
     warm_up_ground_map()
     warm_up_localization(config, rng)
@@ -71,12 +66,7 @@ def warm_up_ground_map() -> None:
 
 
 def warm_up_localization(config: Config, rng: np.random.Generator) -> None:
-    """Locate a bump on itself twice: with particles to draw, then with particles to move.
-
-    Args:
-        config: Configuration; it selects the kernels.
-        rng: Source of the particles.
-    """
+    """Locate a bump on itself twice: with particles to draw, then with particles to move."""
     few = {"search_radius_m": 0.2, "headings": 4}
     localization = config.localization.model_copy(update=few)
     small = config.model_copy(update={"localization": localization})

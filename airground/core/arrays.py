@@ -1,4 +1,4 @@
-"""Types of arrays by their elements, and a check of shape and type when data are built.
+"""Types of arrays, a check of their shape and type, and the kernels' fast-math flags.
 
 `F64` is an array of 64-bit floats, `U8` one of unsigned bytes, and so on; shapes stand in the
 docstrings.
@@ -24,6 +24,9 @@ U16 = NDArray[np.uint16]
 U32 = NDArray[np.uint32]
 U64 = NDArray[np.uint64]
 Mask = NDArray[np.bool_]
+
+FAST = {"contract", "reassoc", "arcp", "nsz"}
+"""Numba's fast-math flags for kernels: those that keep the meaning of NaN."""
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -58,6 +61,13 @@ def read_only(
 def freeze(owner: object, name: str, shape: Sequence[int | None], dtype: type[np.generic]) -> None:
     """Replace an attribute of a frozen data type by its `read_only` array."""
     object.__setattr__(owner, name, read_only(getattr(owner, name), name, shape, dtype))
+
+
+def freeze_stamps(owner: object) -> None:
+    """`freeze` for the (N,) attribute `stamps_ns`, which must strictly increase."""
+    freeze(owner, "stamps_ns", (None,), np.int64)
+    if (np.diff(vars(owner)["stamps_ns"]) <= 0).any():
+        raise ValueError("stamps_ns must strictly increase")
 
 
 def _fits(shape: tuple[int, ...], expected: Sequence[int | None]) -> bool:

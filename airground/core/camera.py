@@ -58,11 +58,7 @@ class PinholeCamera:
         return rays
 
     def back_project(self, depth: Floats) -> Floats:
-        """(height, width, 3) points [m] in the camera; NaN where depth is NaN.
-
-        Args:
-            depth: (height, width), z along the optical axis [m].
-        """
+        """(height, width, 3) points [m] of a depth image (height, width) [m]; NaN stays NaN."""
         if depth.shape != (self.height, self.width):
             raise ValueError(f"depth is {depth.shape}, camera {self.height}x{self.width}")
         return self.rays().astype(depth.dtype) * depth[..., None]

@@ -7,7 +7,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from airground.core.arrays import F32, U8, freeze, read_only
+from airground.core.arrays import F32, U8, freeze
 
 
 class Source(IntEnum):
@@ -32,13 +32,12 @@ class PointCloud:
     normals: F32 | None = None
 
     def __post_init__(self) -> None:
-        points = read_only(self.points, "points", (None, 3), np.float32)
-        if not np.isfinite(points).all():
+        freeze(self, "points", (None, 3), np.float32)
+        if not np.isfinite(self.points).all():
             raise ValueError("points: every coordinate must be finite")
-        object.__setattr__(self, "points", points)
-        freeze(self, "colours", (len(points), 3), np.uint8)
+        freeze(self, "colours", (len(self), 3), np.uint8)
         if self.normals is not None:
-            freeze(self, "normals", (len(points), 3), np.float32)
+            freeze(self, "normals", (len(self), 3), np.float32)
 
     def __len__(self) -> int:
         return len(self.points)

@@ -42,13 +42,7 @@ class MavTracked(Event):
 
 @dataclass(frozen=True, eq=False)
 class GroundTracked(Event):
-    """The ground robot's camera has a pose (Sec. IV).
-
-    Attributes:
-        T_ground_camera: Pose of the camera in the ground robot's map.
-        covariance: (6, 6) covariance as in `MavTracked`.
-        scale_sigma: Relative standard deviation of the scale, as in `MavTracked`.
-    """
+    """The ground robot's camera has a pose in its map (Sec. IV); attributes as of `MavTracked`."""
 
     T_ground_camera: SE3
     covariance: F64 | None = None
@@ -99,11 +93,7 @@ class DepthMapMade(Event):
 
 @dataclass(frozen=True)
 class FieldAdded(Event):
-    """A depth map went into the histogram of distance fields (Sec. V).
-
-    Attributes:
-        reference_stamp_ns: Stamp of the depth map's reference view [ns].
-    """
+    """The depth map of a reference view went into the histogram of distance fields (Sec. V)."""
 
     reference_stamp_ns: int
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from airground.core.arrays import F32, F64, I64, U8, freeze
+from airground.core.arrays import F32, F64, I64, U8, freeze, freeze_stamps
 from airground.core.camera import PinholeCamera
 from airground.core.cloud import Source
 from airground.core.se3 import SE3
@@ -62,9 +62,7 @@ class ImuSamples:
     accelerometer: F64
 
     def __post_init__(self) -> None:
-        freeze(self, "stamps_ns", (None,), np.int64)
-        if (np.diff(self.stamps_ns) <= 0).any():
-            raise ValueError("stamps_ns must strictly increase")
+        freeze_stamps(self)
         for name in ("gyro", "accelerometer"):
             freeze(self, name, (len(self.stamps_ns), 3), np.float64)
 
@@ -87,9 +85,7 @@ class MagneticSamples:
     field: F64
 
     def __post_init__(self) -> None:
-        freeze(self, "stamps_ns", (None,), np.int64)
-        if (np.diff(self.stamps_ns) <= 0).any():
-            raise ValueError("stamps_ns must strictly increase")
+        freeze_stamps(self)
         freeze(self, "field", (len(self.stamps_ns), 3), np.float64)
 
     def between(self, start_ns: int, end_ns: int) -> MagneticSamples:

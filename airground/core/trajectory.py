@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from airground.core.arrays import F64, I64, read_only
+from airground.core.arrays import F64, I64, freeze, freeze_stamps
 from airground.core.se3 import SE3, interpolate
 
 
@@ -26,19 +26,13 @@ class Trajectory:
     translations: F64
 
     def __post_init__(self) -> None:
-        stamps = read_only(self.stamps_ns, "stamps_ns", (None,), np.int64)
-        n = len(stamps)
-        if n == 0:
+        freeze_stamps(self)
+        if len(self) == 0:
             raise ValueError("a trajectory needs at least one pose")
-        if (np.diff(stamps) <= 0).any():
-            raise ValueError("stamps_ns must strictly increase")
-        rotations = read_only(self.rotations, "rotations", (n, 3, 3), np.float64)
-        translations = read_only(self.translations, "translations", (n, 3), np.float64)
-        if not (np.isfinite(rotations).all() and np.isfinite(translations).all()):
+        freeze(self, "rotations", (len(self), 3, 3), np.float64)
+        freeze(self, "translations", (len(self), 3), np.float64)
+        if not (np.isfinite(self.rotations).all() and np.isfinite(self.translations).all()):
             raise ValueError("a pose is not finite")
-        object.__setattr__(self, "stamps_ns", stamps)
-        object.__setattr__(self, "rotations", rotations)
-        object.__setattr__(self, "translations", translations)
 
     @classmethod
     def from_poses(cls, stamps_ns: list[int], poses: list[SE3]) -> Trajectory:

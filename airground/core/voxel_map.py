@@ -12,13 +12,10 @@ _HALF = 1 << (_BITS - 1)
 
 
 class VoxelMap:
-    """A running mean of position and colour in every cube that holds points.
+    """A running mean of position and colour in every cube of side `voxel_m` that holds points.
 
     Averaging before anything takes a maximum matters: the highest of many noisy points is
     too high by a few of their standard deviations.
-
-    Args:
-        voxel_m: Side of the cubes [m].
     """
 
     def __init__(self, voxel_m: float) -> None:

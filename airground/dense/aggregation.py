@@ -13,12 +13,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from airground.core.arrays import I16, I32, U16
-from airground.dense.plane_sweep import CostVolume
+from airground.core.arrays import FAST, I16, I32, U16
+from airground.dense.plane_sweep import CostVolume, Workspace
 from airground.dense.sweep_kernels import COST_SCALE
-from airground.dense.workspace import Workspace
 
-FAST = {"contract", "reassoc", "arcp", "nsz"}
 MEAN_SCALE = 128.0
 """Mean costs are stored in 1/128 of a grey level."""
 ROWS_A_TASK = 12

@@ -7,12 +7,11 @@ import numpy as np
 from numba import njit, prange
 
 from airground.config import PlaneSweep as Parameters
-from airground.core.arrays import F32, U16, Mask
+from airground.core.arrays import F32, FAST, U16, Mask
 from airground.dense.aggregation import aggregate
 from airground.dense.plane_sweep import PlaneSweep
 from airground.dense.semiglobal import smooth
 
-FAST = {"contract", "reassoc", "arcp", "nsz"}
 PARABOLA_REACH = 3
 """The parabola goes through the winner and the costs this many planes away: the planes are
 finer than the cost's minimum is wide, so that next neighbours would mostly show noise."""
@@ -25,11 +24,7 @@ SPECKLE_STEP_PLANES = 4.0
 
 
 def depth_from_costs(sweep: PlaneSweep, parameters: Parameters) -> F32:
-    """The depth map of a finished sweep.
-
-    Returns:
-        (height, width) float32 [m], NaN where the depth is uncertain.
-    """
+    """(height, width) depth [m] of a finished sweep, NaN where it is uncertain."""
     workspace = sweep.workspace
     mean = aggregate(
         sweep.volumes,

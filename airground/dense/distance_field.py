@@ -12,11 +12,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from airground.core.arrays import F32, U32
+from airground.core.arrays import F32, FAST, U32
 from airground.core.surface import DepthMap
 from airground.dense.volume import Volume
 
-FAST = {"contract", "reassoc", "arcp", "nsz"}
 MAX_BINS = 8
 MAX_DEPTH_MAPS = 15
 
@@ -25,9 +24,7 @@ class FieldHistogram:
     """n(v, j) of Eq. 1: how often each voxel got a value from each bin.
 
     Attributes:
-        volume: The voxels.
         truncation_m: Distance at which the field reaches -1 or 1 [m].
-        bins: Number of bins, at most 8.
         counts: (rows, planes, columns) uint32, bin j in bits 4 j to 4 j + 3.
         depth_maps: Number of depth maps in the histogram.
     """
@@ -47,11 +44,7 @@ class FieldHistogram:
         self.depth_maps = 0
 
     def add(self, depth_map: DepthMap) -> None:
-        """Adds the distance field of one depth map.
-
-        Raises:
-            ValueError: The histogram's four bits are full.
-        """
+        """Adds the distance field of one depth map; ValueError if the four bits are full."""
         if self.depth_maps >= MAX_DEPTH_MAPS:
             raise ValueError(f"a histogram takes at most {MAX_DEPTH_MAPS} depth maps")
         volume, camera = self.volume, depth_map.camera

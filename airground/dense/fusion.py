@@ -11,10 +11,9 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from airground.core.arrays import F32, U32
+from airground.core.arrays import F32, FAST, U32
 from airground.dense.distance_field import MAX_BINS
 
-FAST = {"contract", "reassoc", "arcp", "nsz"}
 STEP = 12.0**-0.5
 """Primal and dual step; the squared norm of the 3-d gradient is at most 12."""
 BLOCK_ROWS = 16
@@ -35,13 +34,9 @@ class Fusion:
         self._memory: F32 | None = None
 
     def fuse(self, counts: U32) -> F32:
-        """The field phi.
+        """The field phi, (rows, planes, columns), for the packed histogram n(v, j) of that shape.
 
-        Args:
-            counts: (rows, planes, columns) uint32, the packed histogram n(v, j).
-
-        Returns:
-            (rows, planes, columns) float32; valid until the next call.
+        It is valid until the next call.
         """
         if self._memory is None or self._memory.shape[1:] != counts.shape:
             self._memory = np.empty((5, *counts.shape), np.float32)

@@ -21,7 +21,6 @@ from airground.core.arrays import F32, F64, I16, I32, U8, U16
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.dense import sweep_kernels as kernels
-from airground.dense.workspace import Workspace
 
 ROUNDING_PX = 1e-6
 """Distance outside of an image that still counts as its edge [px]: rounding."""
@@ -119,6 +118,28 @@ def _covered_columns(homography: F64, camera: PinholeCamera) -> I32:
     hi = np.append(np.minimum(last[:-1], last[1:]), 0)
     hi[hi <= lo] = 0
     return np.stack([np.where(hi > 0, lo, 0), hi], axis=1).astype(np.int32)
+
+
+class Workspace:
+    """Arrays of uint16 that are free for use: memory that outlives a depth map.
+
+    A cost volume has 36 MB. Asking the system for it anew with each depth map, and touching it
+    for the first time, takes longer than aggregating it.
+    """
+
+    def __init__(self) -> None:
+        self._free: list[U16] = []
+
+    def take(self, shape: tuple[int, ...]) -> U16:
+        """A contiguous array with anything in it, not zeros."""
+        for index, array in enumerate(self._free):
+            if array.size == np.prod(shape):
+                return self._free.pop(index).reshape(shape)
+        return np.empty(shape, np.uint16)
+
+    def give(self, array: U16) -> None:
+        """Hand an array back; it must not be used afterwards."""
+        self._free.append(array)
 
 
 class CostVolume:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from airground.core.arrays import F32, F64, I32, U8, U32
+from airground.core.arrays import F32, F64, FAST, I32, U8, U32
 from airground.core.cloud import PointCloud
 from airground.core.surface import DepthMap
 from airground.dense.distance_field import MAX_BINS
 from airground.dense.volume import Volume
-
-FAST = {"contract", "reassoc", "arcp", "nsz"}
 
 
 def cast_surface(

@@ -12,11 +12,10 @@ import numpy as np
 from numba import njit, prange
 
 from airground.config import PlaneSweep as Parameters
-from airground.core.arrays import F32, U16
+from airground.core.arrays import F32, FAST, U16
 from airground.dense.aggregation import MEAN_SCALE
-from airground.dense.workspace import Workspace
+from airground.dense.plane_sweep import Workspace
 
-FAST = {"contract", "reassoc", "arcp", "nsz"}
 STRIPS = 16
 """Columns are shared out in this many strips for the vertical directions."""
 ROWS_AT_A_TIME = 8

@@ -10,9 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from airground.core.arrays import F32, F64, I16, I32, U16
+from airground.core.arrays import F32, F64, FAST, I16, I32, U16
 
-FAST = {"contract", "reassoc", "arcp", "nsz"}
 COST_SCALE = 16.0
 """Costs are stored in sixteenths of a grey level."""
 MAX_RUNS = 64

@@ -20,13 +20,7 @@ BEFORE, AFTER = 0, 1
 
 @dataclass(frozen=True, eq=False)
 class PosedImage:
-    """An image and where it was taken.
-
-    Attributes:
-        stamp_ns: Stamp of the image [ns].
-        image: (height, width) uint8 grey image.
-        T_mav_camera: Pose of the camera in the MAV's map.
-    """
+    """A grey image (height, width) of the MAV and the pose of its camera in the MAV's map."""
 
     stamp_ns: int
     image: U8
@@ -90,16 +84,10 @@ class ViewSet:
     def offer(self, view: PosedImage) -> bool:
         """Whether the view joins the depth map; notices when the camera has left."""
         distance = view.distance(self.reference)
-        if (
-            view.stamp_ns > self.reference.stamp_ns
-            and distance > self.parameters.depth_map_radius_m
-        ):
+        outside = distance > self.parameters.depth_map_radius_m
+        if outside and view.stamp_ns > self.reference.stamp_ns:
             self.complete = True
-        if (
-            self.complete
-            or distance < self.spacing
-            or distance > self.parameters.depth_map_radius_m
-        ):
+        if self.complete or outside or distance < self.spacing:
             return False
         if len(self._members) >= self.parameters.max_views:
             return False

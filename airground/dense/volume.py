@@ -51,13 +51,10 @@ class Volume:
         """The volume before `reference` that holds what all depth maps saw.
 
         Args:
-            depth_maps: Depth maps, at least one of them with a finite depth.
+            depth_maps: Depth maps; ValueError if no depth is finite.
             reference: The depth map in whose view the surface will be cast.
             voxels: Columns, rows and planes.
             margin_m: Room before the nearest and behind the farthest depth [m].
-
-        Raises:
-            ValueError: No depth is finite.
         """
         depths = []
         for depth_map in depth_maps:

@@ -18,12 +18,7 @@ COLOUR_SCALE = 255.0
 
 
 def empty_grid(voxel_m: float, blocks: int) -> o3d.t.geometry.VoxelBlockGrid:
-    """A grid for what the ground robot sees.
-
-    Args:
-        voxel_m: Side of a voxel [m].
-        blocks: Number of blocks to make room for.
-    """
+    """A grid of voxels of side `voxel_m` [m], with room for that many blocks at first."""
     return o3d.t.geometry.VoxelBlockGrid(
         attr_names=ATTRIBUTES,
         attr_dtypes=(o3d.core.float32,) * 3,

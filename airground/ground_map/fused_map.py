@@ -33,13 +33,33 @@ from airground.ground_map.touched_blocks import touched_blocks
 _FIRST_BLOCKS = 10_000
 
 
-class GroundMap:
-    """Keyframes' depth images, fused in the frame `ground`.
+class FixedMap:
+    """A map of the ground from elsewhere: takes the place of a `GroundMap` and never changes.
 
     Args:
-        camera: Nominal camera of both images.
-        config: Section `ground_mapping` of the configuration.
+        cloud: Cloud in the frame `ground`, in which the ground robot's poses are given.
     """
+
+    keyframes = 0
+
+    def __init__(self, cloud: PointCloud) -> None:
+        self._cloud = cloud
+
+    def wants(self, T_ground_camera: SE3) -> bool:
+        return False
+
+    def add(self, image: GroundImage, T_ground_camera: SE3) -> None:
+        raise TypeError("a fixed map takes no keyframes")
+
+    def follow(self, trajectory: Trajectory) -> bool:
+        return False
+
+    def cloud(self) -> PointCloud:
+        return self._cloud
+
+
+class GroundMap:
+    """Keyframes' depth images, fused in the frame `ground`."""
 
     def __init__(self, camera: PinholeCamera, config: GroundMapping) -> None:
         self._config = config
@@ -51,7 +71,6 @@ class GroundMap:
 
     @property
     def keyframes(self) -> int:
-        """Number of keyframes in the map."""
         return len(self._keyframes)
 
     def wants(self, T_ground_camera: SE3) -> bool:
@@ -72,7 +91,6 @@ class GroundMap:
         return not _moved(keyframe.T_ground_camera, T_ground_camera, distance, angle)
 
     def add(self, image: GroundImage, T_ground_camera: SE3) -> None:
-        """Take in a keyframe."""
         keyframe = GroundKeyframe.pack(image, T_ground_camera, self._config.max_depth_m)
         self._keyframes.append(keyframe)
         self._cloud = None
@@ -98,11 +116,8 @@ class GroundMap:
         ):
             return False
         self._keyframes = corrected
-        self._grid, self._fused, self._cloud = (
-            empty_grid(self._config.voxel_m, _FIRST_BLOCKS),
-            0,
-            None,
-        )
+        self._grid = empty_grid(self._config.voxel_m, _FIRST_BLOCKS)
+        self._fused, self._cloud = 0, None
         return True
 
     def cloud(self) -> PointCloud:
@@ -117,7 +132,6 @@ class GroundMap:
         return BlockedField.of(self._grid, self._config.voxel_m)
 
     def _catch_up(self) -> None:
-        """Fuse what is not in the distance field yet."""
         waiting = self._keyframes[self._fused :]
         # Unpacking takes a core for almost as long as fusing does.
         with (
@@ -131,24 +145,10 @@ class GroundMap:
         """Put a keyframe's images into the distance field."""
         self._fused += 1
         config, pose = self._config, keyframe.T_ground_camera
-        blocks = touched_blocks(
-            depth,
-            self._camera,
-            pose,
-            BLOCK * config.voxel_m,
-            config.truncation_m,
-            config.max_depth_m,
-        )
-        integrate(
-            self._grid,
-            blocks,
-            depth,
-            colour,
-            self._camera,
-            pose,
-            config.voxel_m,
-            config.truncation_m,
-        )
+        camera, voxel_m, truncation_m = self._camera, config.voxel_m, config.truncation_m
+        block_m = BLOCK * voxel_m
+        blocks = touched_blocks(depth, camera, pose, block_m, truncation_m, config.max_depth_m)
+        integrate(self._grid, blocks, depth, colour, camera, pose, voxel_m, truncation_m)
 
 
 def _corrected(keyframe: GroundKeyframe, trajectory: Trajectory) -> GroundKeyframe:

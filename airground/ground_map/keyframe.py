@@ -59,7 +59,6 @@ class GroundKeyframe:
         )
 
     def unpack(self) -> tuple[F32, U8]:
-        """Depth and colour image, as `depth` and `colour` return them."""
         return self.depth(), self.colour()
 
     def depth(self) -> F32:

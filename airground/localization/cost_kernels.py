@@ -10,13 +10,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from airground.core.arrays import F32, F64, Floats
+from airground.core.arrays import F32, F64, FAST, Floats
 
 COUNT, SUM_A, SUM_G, SUM_AA, SUM_GG, SUM_AG = range(6)
-KEEPS_NAN = {"contract", "reassoc", "arcp", "nsz"}
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=KEEPS_NAN)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def mean_height(heights: F32) -> tuple[float, int]:
     """Mean (0 of none) and number of the heights that are not NaN."""
     total, count = 0.0, 0
@@ -90,7 +89,7 @@ def one_minus_correlation(sums: Floats, min_count: float, min_relief_m: float) -
     return costs
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=KEEPS_NAN)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def sums_at_positions(
     aerial: F32, aerial_mask: F32, ground: F32, ground_mask: F32, shifts: F64
 ) -> F64:
@@ -136,7 +135,7 @@ def sums_at_positions(
 
 
 # Inlined: called, it rounded otherwise once the caller came from the cache.
-@njit(cache=True, inline="always", error_model="numpy", fastmath=KEEPS_NAN)
+@njit(cache=True, inline="always", error_model="numpy", fastmath=FAST)
 def _add_row(
     heights: F32,
     filled: F32,

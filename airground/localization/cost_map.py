@@ -45,13 +45,7 @@ def masked(heights: F32, margin: int = 0) -> Masked:
 
 
 def costs_of(sums: Floats, aerial_cells: int, config: Localization) -> F32:
-    """(N,) costs of the configured kind for sums (N, 6) over the overlap.
-
-    Args:
-        sums: (N, 6) sums as in `cost_kernels`.
-        aerial_cells: Number of filled cells of the aerial map.
-        config: Section `localization` of the configuration.
-    """
+    """(N,) costs of the configured kind for sums (N, 6) as in `cost_kernels`."""
     # "More than" the fraction (Sec. VI-A), where the number of cells is whole.
     min_count = np.floor(config.min_overlap * aerial_cells) + 0.5
     if config.cost == "zmssd":
@@ -115,11 +109,6 @@ class OffsetSearch:
         sums = self.sums(aerial).reshape(-1, 6)
         return costs_of(sums, aerial.filled_cells, config).reshape(self.shape)
 
-    def cost_map(self, aerial: HeightMap, heading: float, config: Localization) -> CostMap:
-        """The costs with their place in the frame `ground`."""
-        origin = self.first / self.cells_per_m
-        return CostMap(self.costs(aerial, config), origin, self.cells_per_m, heading, config.cost)
-
     def _transform(self, patch: Masked) -> tuple[C64, C64, C64]:
         images = (patch.mask, patch.heights, patch.heights**2)
         mask, heights, squares = (self._spectrum(image) for image in images)
@@ -155,7 +144,8 @@ def compute_cost_map(
         config: Section `localization` of the configuration.
     """
     search = OffsetSearch(ground, centre, config.search_radius_m, reach_of(aerial))
-    return search.cost_map(aerial, heading, config)
+    origin, costs = search.first / search.cells_per_m, search.costs(aerial, config)
+    return CostMap(costs, origin, search.cells_per_m, heading, config.cost)
 
 
 def reach_of(aerial: HeightMap) -> I64:

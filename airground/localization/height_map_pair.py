@@ -7,12 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
-from airground.config import Config
+from airground.config import Config, HeightMaps
 from airground.core.arrays import F32, F64
 from airground.core.belief import HeightMap
+from airground.core.height_map import make_height_map
 from airground.errors import InputError
 from airground.localization.cost_map import Overlays, overlay_at, overlay_turned, reach_of
-from airground.localization.height_map import aerial_height_map, ground_height_map
 from airground.localization.hypotheses import CostVolume, search_headings, search_positions
 
 
@@ -27,7 +27,7 @@ class HeightMapPair:
         stamp_ns: Stamp of the surface [ns].
         points_mav: (N, 3) points of the surface in `mav` [m].
         position_mav: (3,) position of the surface's camera in `mav` [m].
-        points_ground: (M, 3) the ground robot's map in `ground` [m].
+        points_ground: (M, 3) points of the ground robot's map in `ground` [m].
         ground_robot_position: (2,) centre of the search region in `ground` [m].
         heading: Turn of `mav` in `ground` [rad]; not used where it is searched.
         config: The pipeline's parameters; height maps and localization are used.
@@ -92,3 +92,35 @@ class HeightMapPair:
         if self.searched:
             return overlay_turned(self.aerial, self.ground, particles)
         return overlay_at(self.aerial, self.ground, particles[:, :2])
+
+
+def aerial_height_map(
+    points_mav: F32, position_mav: F64, heading: float, config: HeightMaps
+) -> HeightMap:
+    """Heights of an aerial surface around the camera that saw it (Fig. 7a).
+
+    Args:
+        points_mav: (N, 3) [m] in the frame `mav`.
+        position_mav: (3,) the reference camera in `mav` [m].
+        heading: Turn of the frame `mav` in `ground` [rad].
+        config: Resolution and hole filling.
+
+    Returns:
+        x and y relative to the camera along the axes of `ground`: the map lies at a
+        hypothesis u once u is added to its origin. Heights stay those of `mav`.
+    """
+    c, s = np.cos(heading), np.sin(heading)
+    offsets = np.asarray(points_mav, np.float64)[:, :2] - np.asarray(position_mav)[:2]
+    points = np.empty((len(offsets), 3), np.float32)
+    points[:, 0] = c * offsets[:, 0] - s * offsets[:, 1]
+    points[:, 1] = s * offsets[:, 0] + c * offsets[:, 1]
+    points[:, 2] = np.asarray(points_mav)[:, 2]
+    return make_height_map(points, config.cells_per_m, config.dilate_holes)
+
+
+def ground_height_map(
+    points_ground: F32, centre: F64, reach_m: float, config: HeightMaps
+) -> HeightMap:
+    """Heights of points (N, 3) in `ground` over a square of half side `reach_m` (Fig. 7b)."""
+    window = (np.asarray(centre) - reach_m, np.asarray(centre) + reach_m)
+    return make_height_map(points_ground, config.cells_per_m, config.dilate_holes, window)

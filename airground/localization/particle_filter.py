@@ -22,12 +22,8 @@ from airground.localization.particles import densest_mode, mean_pose, resample, 
 class MonteCarloLocalizer:
     """A belief over u, the position (and heading) of the MAV's camera in `ground`.
 
-    Args:
-        config: The pipeline's parameters; height maps and localization are used.
-        rng: Source of all random numbers.
-
     Attributes:
-        config: The pipeline's parameters.
+        config: The pipeline's parameters; height maps and localization are used.
         belief: Belief after the newest aerial surface, None before the first.
     """
 
@@ -40,10 +36,7 @@ class MonteCarloLocalizer:
         self.belief: Belief | None = None
 
     def update(self, pair: HeightMapPair) -> Iterator[Event]:
-        """Take in one aerial surface.
-
-        Args:
-            pair: The surface and the ground map, under this filter's parameters.
+        """Take in one aerial surface and the ground map, under this filter's parameters.
 
         Yields:
             HeightMapsMade, CostMapComputed (where all of it is computed), BeliefUpdated.

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from airground.core.arrays import F32, F64, U32
-from airground.localization.cost_kernels import KEEPS_NAN, mean_height
+from airground.core.arrays import F32, F64, FAST, U32
+from airground.localization.cost_kernels import mean_height
 
 BLOCK = 512
 """Cells that are placed, looked up and added up at a time, so that they stay in the cache."""
@@ -65,7 +65,7 @@ def in_fours(heights: F32) -> tuple[F32, float]:
     return fours, mean
 
 
-@njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=KEEPS_NAN)
+@njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)
 def sums_at_poses(cells: F32, fours: F32, poses: F64) -> F64:
     """The six sums (M, 6) for M poses of a turned aerial map.
 
@@ -101,7 +101,7 @@ def sums_at_poses(cells: F32, fours: F32, poses: F64) -> F64:
     return sums
 
 
-@njit(cache=True, error_model="numpy", fastmath=KEEPS_NAN)
+@njit(cache=True, error_model="numpy", fastmath=FAST)
 def _place_cells(
     cell_x: F32,
     cell_y: F32,
@@ -133,7 +133,7 @@ def _look_up(packed: F64, index: U32, n: int, corners: F64) -> None:
         corners[2 * i], corners[2 * i + 1] = packed[four], packed[four + 1]
 
 
-@njit(cache=True, error_model="numpy", fastmath=KEEPS_NAN)
+@njit(cache=True, error_model="numpy", fastmath=FAST)
 def _add_cells(aerial: F32, fraction_x: F32, fraction_y: F32, corners: F32, sums: F64) -> None:
     """Add cells to the sums, given their fractions and the ground at their four corners."""
     zero, half, one = np.float32(0), np.float32(0.5), np.float32(1)

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from airground.config import Refinement
-from airground.core.arrays import F32, F64, I64
+from airground.core.arrays import F32, F64, FAST, I64
 from airground.core.belief import HeightMap
 from airground.core.height_map import lattice_index, make_height_map
 from airground.core.se3 import SE3
@@ -84,7 +84,7 @@ def _shift_costs(aerial: F32, ground: F32, first: I64, reach: int) -> tuple[F64,
     return costs, counts, heights
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "arcp", "nsz"})
+@njit(cache=True, error_model="numpy", fastmath=FAST)
 def _row_sums(aerial: F32, ground: F32) -> tuple[np.float32, np.float32, np.float32]:
     zero, one = np.float32(0), np.float32(1)
     count, total, squares = zero, zero, zero

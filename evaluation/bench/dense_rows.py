@@ -15,12 +15,11 @@ from airground.core.surface import DepthMap
 from airground.dense.depth_refinement import depth_from_costs
 from airground.dense.distance_field import MAX_DEPTH_MAPS, FieldHistogram
 from airground.dense.fusion import Fusion
-from airground.dense.plane_sweep import PlaneSweep, inverse_depth_planes
+from airground.dense.plane_sweep import PlaneSweep, Workspace, inverse_depth_planes
 from airground.dense.ray_casting import cast_surface, surface_cloud
 from airground.dense.scene_extent import scene_extent
 from airground.dense.view_selection import AFTER, BEFORE, PosedImage
 from airground.dense.volume import Volume
-from airground.dense.workspace import Workspace
 from airground.errors import InputError
 from airground.ground_map import GroundMap
 from airground.ground_map.surface_points import surface_points

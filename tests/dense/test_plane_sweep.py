@@ -19,11 +19,11 @@ from airground.dense.plane_sweep import (
     CostVolume,
     PlaneSweep,
     TurnedView,
+    Workspace,
     halved,
     inverse_depth_planes,
 )
 from airground.dense.sweep_kernels import COST_SCALE, plan_columns
-from airground.dense.workspace import Workspace
 
 CAMERA = PinholeCamera(48, 32, 30.0, 31.0, 22.9, 16.2)
 

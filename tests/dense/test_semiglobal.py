@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from airground.config import PlaneSweep as Parameters
 from airground.dense.aggregation import MEAN_SCALE
+from airground.dense.plane_sweep import Workspace
 from airground.dense.semiglobal import smooth
-from airground.dense.workspace import Workspace
 
 PARAMETERS = Parameters(step_penalty=0.5, jump_penalty=5.0, edge_levels=5.0)
 
