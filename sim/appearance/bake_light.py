@@ -13,8 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sim.geometry.ray_caster import RayCaster
-from sim.geometry.surface import Mesh
+from sim.geometry.surface import Mesh, RayCaster
 from sim.scene import Light
 
 MAIN_SAMPLES = 24

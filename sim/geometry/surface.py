@@ -1,10 +1,11 @@
-"""The true surface of a world: one triangle mesh of everything that a camera can see."""
+"""The true surface of a world: one triangle mesh of all that can be seen, and rays against it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 import numpy as np
+import open3d as o3d
 from numpy.typing import NDArray
 
 from airground.core.se3 import SE3
@@ -49,3 +50,24 @@ def join(meshes: Iterable[Mesh]) -> Mesh:
         triangles.append(part_triangles + offset)
         offset += len(part_vertices)
     return np.concatenate(vertices), np.concatenate(triangles)
+
+
+class RayCaster:
+    """Holds a mesh. Rays are (..., 6) float32: origin [m] and direction of any length."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        vertices, triangles = mesh
+        self._scene = o3d.t.geometry.RaycastingScene(nthreads=2)
+        self._scene.add_triangles(
+            o3d.core.Tensor.from_numpy(vertices.astype(np.float32)),
+            o3d.core.Tensor.from_numpy(triangles.astype(np.uint32)),
+        )
+
+    def blocked(self, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """(...) whether a ray hits anything."""
+        return self._scene.test_occlusions(o3d.core.Tensor.from_numpy(rays)).numpy()
+
+    def hits(self, rays: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
+        """(...) distance in lengths of the direction (infinite for none) and triangle hit."""
+        answer = self._scene.cast_rays(o3d.core.Tensor.from_numpy(rays))
+        return answer["t_hit"].numpy(), answer["primitive_ids"].numpy()

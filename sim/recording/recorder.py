@@ -1,4 +1,4 @@
-"""From a scene to a recording on disk: simulate, store, then render what the sensors see."""
+"""A simulated flight as a recording: stored on disk, or rendered while it is read."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ import os
 import shutil
 import tempfile
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
@@ -17,18 +19,18 @@ from numpy.typing import NDArray
 from airground.core.messages import ImuSamples, MagneticSamples
 from airground.errors import AirgroundError, InputError
 from airground.io import recording_writer
-from airground.io.calibration import CalibrationTable
 from airground.io.header import FrameCounts, Header
+from airground.io.images import metric_depth
+from airground.io.recording import Recording
 from sim.geometry.edges import find_edges
-from sim.recording.frame_pool import make_frames
+from sim.recording.frame_pool import FrameServer, make_frames
 from sim.recording.frames import FramePlan
 from sim.recording.render import with_cameras
 from sim.recording.truth import write_truth
-from sim.robots.motion import RATE_HZ, Motion, Robot, simulate_motion
+from sim.robots.motion import RATE_HZ, Robot, simulate_motion
 from sim.robots.robot_motion import RobotMotion
 from sim.scene import Scene
-from sim.sensors.imu import measure_imu
-from sim.sensors.magnetometer import measure_field
+from sim.sensors.imu import measure_field, measure_imu
 from sim.sensors.miscalibration import CAMERA_RATE_HZ, MAGNETOMETER_RATE_HZ, calibrate
 from sim.sensors.presets import SensorPreset
 from sim.world.world import build_world
@@ -39,6 +41,25 @@ _MARGIN_NS = 20_000_000
 
 Progress = Callable[[int, int], None]
 """Consumer of progress: frames rendered, frames in all."""
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What a recording is made from.
+
+    Attributes:
+        scene: The scene of the world.
+        seed: Decides the heap and, with `flight`, motion and noise.
+        flight: Number of the flight over the same heap.
+        sensors: Quality of the sensors.
+        duration_s: Cuts the flight short; the scene's own length if None.
+    """
+
+    scene: Scene
+    seed: int
+    flight: int
+    sensors: SensorPreset
+    duration_s: float | None = None
 
 
 def record(
@@ -85,7 +106,7 @@ def record(
             tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".partial", dir=out.parent)
         )
         temporary.chmod(0o755)
-        _fill(temporary, scene, seed, flight, preset, duration_s, workers, progress)
+        _fill(temporary, Flight(scene, seed, flight, preset, duration_s), workers, progress)
         temporary.rename(out)
     except OSError as error:
         if error.errno == errno.ENOSPC:
@@ -97,40 +118,69 @@ def record(
     return out
 
 
-def _fill(
-    root: Path,
-    scene: Scene,
-    seed: int,
-    flight: int,
-    preset: SensorPreset,
-    duration_s: float | None,
-    workers: int,
-    progress: Progress | None,
-) -> None:
+def _fill(root: Path, flight: Flight, workers: int, progress: Progress | None) -> None:
     """Write a whole recording into an empty folder."""
-    header, plan = write_all_but_images(root, scene, seed, flight, preset, duration_s)
-    store_model(plan, scene, seed)
+    header, plan = write_all_but_images(root, flight)
+    _store_model(plan, flight)
     digests = _render(plan, workers, progress)
     plan.model.unlink()
     plan.edges.unlink()
     recording_writer.finish(root, header, digests)
 
 
-def write_all_but_images(
-    root: Path, scene: Scene, seed: int, flight: int, preset: SensorPreset, duration_s: float | None
-) -> tuple[Header, FramePlan]:
+@contextmanager
+def rendered(flight: Flight, workers: int) -> Iterator[Recording]:
+    """The recording that `record` would make, message by message the same.
+
+    Its folder, with samples and truth but without images, lasts as long as the context.
+
+    Args:
+        flight: Flight to simulate.
+        workers: Number of processes that draw; they stay a few frames ahead of the reader.
+
+    Raises:
+        AirgroundError: One line on what was wrong.
+    """
+    with tempfile.TemporaryDirectory(prefix="airground-") as folder:
+        root = Path(folder)
+        try:
+            header, plan = write_all_but_images(root, flight)
+            recording_writer.finish(root, header, {})
+            _store_model(plan, flight)
+        except OSError as error:
+            raise AirgroundError(f"{root}: the flight cannot be prepared there: {error}") from None
+        with FrameServer(plan, workers) as frames:
+            depth_units_per_m = header.calibration.ground.depth.units_per_m
+            yield Recording.open(folder, _DrawnImages(frames, depth_units_per_m))
+
+
+@dataclass(frozen=True)
+class _DrawnImages:
+    """The images as they would be read from disk, where PNG loses nothing."""
+
+    frames: FrameServer
+    depth_units_per_m: float
+
+    def mav(self, index: int) -> NDArray[np.uint8]:
+        return self.frames.mav(index)
+
+    def ground(self, index: int) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        colour, depth_units = self.frames.ground(index)
+        return colour, metric_depth(depth_units, self.depth_units_per_m)
+
+
+def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan]:
     """Simulate a flight and write its samples, lists and truth into an empty folder.
 
     Returns:
         The header that is to be written last, and what the images are to be made from once
-        `store_model` has stored the world.
+        `_store_model` has stored the world.
     """
-    motion_rng, calibration_rng, mav_rng, ground_rng = np.random.default_rng([seed, flight]).spawn(
-        4
-    )
+    scene, preset, seeds = flight.scene, flight.sensors, (flight.seed, flight.flight)
+    motion_rng, calibration_rng, mav_rng, ground_rng = np.random.default_rng(seeds).spawn(4)
     # Without pictures, so that an impossible flight is reported at once.
-    world = build_world(scene, seed, pictures=False)
-    motion = simulate_motion(world, scene, int(motion_rng.integers(2**63)), duration_s)
+    world = build_world(scene, flight.seed, pictures=False)
+    motion = simulate_motion(world, scene, int(motion_rng.integers(2**63)), flight.duration_s)
     sensors = calibrate(
         scene.mav.camera_f_px, motion.mav.mounting, motion.ground.mounting, preset, calibration_rng
     )
@@ -151,15 +201,25 @@ def write_all_but_images(
         motion=root / "truth/motion.npz",
         true=sensors.true,
         preset=preset,
-        seeds=(seed, flight),
+        seeds=seeds,
         stamps_ns=stamps,
     )
-    return _header(scene, seed, flight, preset, motion, stamps, nominal), plan
+    header = Header(
+        scene=scene.name,
+        seed=flight.seed,
+        flight=flight.flight,
+        sensors=preset.name,
+        duration_s=motion.duration_s,
+        frames=FrameCounts(mav=len(stamps["mav"]), ground=len(stamps["ground"])),
+        calibration=nominal,
+        digests={},
+    )
+    return header, plan
 
 
-def store_model(plan: FramePlan, scene: Scene, seed: int) -> None:
+def _store_model(plan: FramePlan, flight: Flight) -> None:
     """Build the world with its pictures once for all processes: they take long to make."""
-    world = build_world(scene, seed)
+    world = build_world(flight.scene, flight.seed)
     true = plan.true
     cameras = {"mav": true.mav.camera.pinhole(), "ground": true.ground.camera.pinhole()}
     model = with_cameras(world.spec, cameras)
@@ -188,27 +248,6 @@ def _samples(
         stamps_ns[every], robot.field_imu[every], robot.anomaly_imu[every], preset.magnetic, rng
     )
     return measure_imu(ideal, preset.imu, rng), field
-
-
-def _header(
-    scene: Scene,
-    seed: int,
-    flight: int,
-    preset: SensorPreset,
-    motion: Motion,
-    stamps: dict[Robot, NDArray[np.int64]],
-    nominal: CalibrationTable,
-) -> Header:
-    return Header(
-        scene=scene.name,
-        seed=seed,
-        flight=flight,
-        sensors=preset.name,
-        duration_s=motion.duration_s,
-        frames=FrameCounts(mav=len(stamps["mav"]), ground=len(stamps["ground"])),
-        calibration=nominal,
-        digests={},
-    )
 
 
 def _render(plan: FramePlan, workers: int, progress: Progress | None) -> dict[str, dict[str, str]]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.errors import InputError
-from sim.geometry.ray_caster import RayCaster
+from sim.geometry.surface import RayCaster
 from sim.robots.paths import cut_headings, heading_path, planar_path
 from sim.scene import GroundPath, Scene, load_scene
 from sim.world.world import World, build_world

@@ -70,6 +70,9 @@ class ImuNoise:
     accelerometer_walk: float
     accelerometer_bias: float
 
+    def scaled(self, factor: float) -> ImuNoise:
+        return ImuNoise(**{name: factor * value for name, value in vars(self).items()})
+
 
 @dataclass(frozen=True)
 class MagneticNoise:
@@ -143,14 +146,7 @@ HARSH = SensorPreset(
     "harsh",
     image=ImageNoise(2.0, 0.094, 0.35, 0.10, 0.015),
     depth=DepthNoise(1.5, 1.2, 1 / 8, 77.0, 4.0, (0.5, 4.5)),
-    imu=ImuNoise(
-        gyro_density=3 * ADIS16448.gyro_density,
-        gyro_walk=3 * ADIS16448.gyro_walk,
-        gyro_bias=3 * ADIS16448.gyro_bias,
-        accelerometer_density=3 * ADIS16448.accelerometer_density,
-        accelerometer_walk=3 * ADIS16448.accelerometer_walk,
-        accelerometer_bias=3 * ADIS16448.accelerometer_bias,
-    ),
+    imu=ADIS16448.scaled(3),
     magnetic=MagneticNoise(0.6e-6, 1.1e-6, 1.8),
     calibration=CalibrationErrors(3e-3, np.deg2rad(0.3), 3_000_000, 9e-3),
 )
@@ -184,7 +180,7 @@ def with_noise(preset: SensorPreset, factor: float) -> SensorPreset:
         and replace(
             depth, axial_scale=factor * depth.axial_scale, lateral_px=factor * depth.lateral_px
         ),
-        imu=imu and ImuNoise(**{name: factor * value for name, value in vars(imu).items()}),
+        imu=imu and imu.scaled(factor),
     )
 
 

@@ -12,8 +12,7 @@ from airground.core.messages import Stamped
 from airground.errors import AirgroundError, InputError
 from airground.io.recording import Recording
 from sim.recording import recorder
-from sim.recording.recorder import record
-from sim.recording.rendered import Flight, rendered
+from sim.recording.recorder import Flight, record, rendered
 from sim.recording.truth import Truth
 from sim.scene import parse_scene
 from sim.sensors.presets import NOMINAL

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from airground.core.messages import ImuSamples
-from sim.sensors.imu import faults, measure_imu
-from sim.sensors.magnetometer import measure_field
+from sim.sensors.imu import faults, measure_field, measure_imu
 from sim.sensors.presets import HARSH, NOMINAL
 
 RATE_HZ = 200.0

@@ -4,8 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from sim.geometry.ray_caster import RayCaster
-from sim.geometry.surface import BOX_CORNERS, BOX_TRIANGLES, join, rectangle_mesh
+from sim.geometry.surface import BOX_CORNERS, BOX_TRIANGLES, RayCaster, join, rectangle_mesh
 from sim.scene import load_scene
 from sim.world.world import World, build_world
 

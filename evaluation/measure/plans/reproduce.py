@@ -14,7 +14,7 @@ from evaluation.measure.work.measure import measure, recorded, recording_name
 from evaluation.measure.work.unit import Finished, Unit, UnitStore, grouped
 from evaluation.setup.setups import Setup
 from evaluation.table.rows import CONTROL_SCENES, SEQUENCE_KEYS
-from sim.recording.rendered import Flight
+from sim.recording.recorder import Flight
 from sim.scene import Scene
 from sim.sensors.presets import SensorPreset
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from evaluation.measure.plans.reproduce import Plan
 from evaluation.measure.protocol.trials import Protocol
 from evaluation.setup.setups import Setup
-from sim.recording.rendered import Flight
+from sim.recording.recorder import Flight
 from sim.scene import load_scene
 from sim.sensors.presets import SensorPreset
 

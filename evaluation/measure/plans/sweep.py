@@ -13,7 +13,7 @@ from evaluation.measure.protocol.trials import Protocol
 from evaluation.measure.work.unit import Unit, grouped
 from evaluation.setup.settings import parsed_value
 from evaluation.setup.setups import Setup
-from sim.recording.rendered import Flight
+from sim.recording.recorder import Flight
 from sim.scene import Scene
 from sim.sensors.presets import SensorPreset
 

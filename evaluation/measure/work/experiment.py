@@ -44,7 +44,7 @@ from evaluation.table.row_writer import RowWriter
 from evaluation.table.rows import ALIGNMENT_STAGE, ResultTable
 from evaluation.table.tracking_quality import add_tracking
 from evaluation.table.truth_errors import pose_error, surface_error
-from sim.recording.rendered import Flight, rendered
+from sim.recording.recorder import Flight, rendered
 from sim.recording.truth import Truth
 
 REPEATED = "the pipeline's sightings, repeated from a later start"

@@ -13,8 +13,7 @@ from evaluation.measure.work.crew import Crew
 from evaluation.measure.work.experiment import measure_units
 from evaluation.measure.work.unit import Finished, Unit, UnitStore, grouped
 from evaluation.setup.progress import step
-from sim.recording.recorder import record
-from sim.recording.rendered import Flight
+from sim.recording.recorder import Flight, record
 
 log = logging.getLogger(__name__)
 

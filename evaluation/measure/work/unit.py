@@ -19,7 +19,7 @@ from evaluation.measure.showcase import Showcase
 from evaluation.measure.work.code_version import code_version
 from evaluation.setup.setups import Setup
 from evaluation.table.rows import ResultTable
-from sim.recording.rendered import Flight
+from sim.recording.recorder import Flight
 
 KEY_LENGTH = 32
 """Hexadecimal digits of a key: 128 bits, so that no two units share one."""

@@ -11,8 +11,7 @@ from evaluation.measure.work.experiment import measure_units
 from evaluation.measure.work.unit import Finished, Unit
 from evaluation.setup.setups import Setup
 from evaluation.table.rows import CLOCK_STAGES
-from sim.recording.recorder import record
-from sim.recording.rendered import Flight
+from sim.recording.recorder import Flight, record
 from sim.scene import parse_scene
 from sim.sensors.presets import NOMINAL
 from tests.sim.small_flight import SCENE

@@ -17,7 +17,7 @@ from evaluation.measure.protocol.trials import Protocol
 from evaluation.measure.work import unit as module
 from evaluation.measure.work.unit import Unit, grouped, key_of
 from evaluation.setup.setups import PoseNoise, Setup, with_localization
-from sim.recording.rendered import Flight
+from sim.recording.recorder import Flight
 from sim.scene import load_scene
 from sim.sensors.presets import HARSH, NOMINAL, with_heading_error, with_noise
 
