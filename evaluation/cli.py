@@ -46,10 +46,7 @@ JOBS: dict[str, dict[str, tuple[str, str]]] = {
     },
     "results": {
         "evaluate": ("results", "Put the results of one or more runs into one report."),
-        "compare": (
-            "results",
-            "Draw two to four runs on one page: what changed, and by how much.",
-        ),
+        "compare": ("results", "Draw two to four runs on one page: what changed, and by how much."),
         "check": (
             "results",
             "Hold results against accepted ones: better, worse, or no difference seen.",

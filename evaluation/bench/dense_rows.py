@@ -42,11 +42,7 @@ class Sweep:
     """
 
     def __init__(
-        self,
-        camera: PinholeCamera,
-        reference: PosedImage,
-        views: list[PosedImage],
-        config: Config,
+        self, camera: PinholeCamera, reference: PosedImage, views: list[PosedImage], config: Config
     ) -> None:
         before = [view for view in views if view.stamp_ns < reference.stamp_ns]
         extent = scene_extent(reference, before or views, camera)

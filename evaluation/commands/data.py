@@ -10,14 +10,7 @@ from tyro.conf import Positional, UseAppendAction
 
 from airground.errors import InputError
 from evaluation.commands.estimates import RENDER_S_PER_S, work_s
-from evaluation.commands.options import (
-    OutOption,
-    SeedOption,
-    SensorOption,
-    Shown,
-    Verb,
-    in_range,
-)
+from evaluation.commands.options import OutOption, SeedOption, SensorOption, Shown, Verb, in_range
 from evaluation.setup.console import EXIT_FAULT_FOUND, EXIT_OK
 
 
@@ -72,10 +65,8 @@ class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
         flight = int(in_range("--flight", self.flight))
         check_free(self.out)
         seconds = self.duration_s or scene.duration_s
-        announce(
-            f"records {seconds:.0f} s over {scene.name}",
-            work_s(seconds * RENDER_S_PER_S, self.workers()),
-        )
+        expected_s = work_s(seconds * RENDER_S_PER_S, self.workers())
+        announce(f"records {seconds:.0f} s over {scene.name}", expected_s)
         with step("rendering", unit="images") as rendering:
             record(
                 scene,
@@ -97,11 +88,7 @@ class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
         if not self.scenes or self.seed or self.flight:
             raise InputError("--seeds: with at least one SCENE, and without --seed and --flight")
         plan = plan_dataset(
-            self.scenes,
-            parse_seeds(seeds),
-            parse_split(self.split),
-            self.sensors,
-            self.duration_s,
+            self.scenes, parse_seeds(seeds), parse_split(self.split), self.sensors, self.duration_s
         )
         jobs = int(in_range("--jobs", self.jobs, low=1, high=1000))
         scenes = {scene: load_scene(scene) for scene in self.scenes}
@@ -153,8 +140,7 @@ class Export(OutOption, Verb):
     format: Literal["tum", "euroc", "mcap", "nerfstudio", "colmap"]
     """tum is of the ground robot, euroc of the MAV, the others of either"""
     robot: Annotated[
-        Literal["mav", "ground", "both"] | None,
-        Shown("{mav,ground,both}", "what the format holds"),
+        Literal["mav", "ground", "both"] | None, Shown("{mav,ground,both}", "what the format holds")
     ] = None
     """robot whose sensors are written"""
 

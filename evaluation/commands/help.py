@@ -26,14 +26,7 @@ _POSITIONAL = get_args(Positional[int])[1]
 
 @dataclass(frozen=True)
 class Option:
-    """An option as the help shows it.
-
-    Attributes:
-        form: The option with its value: "--seed N".
-        text: What it does, with its default.
-        required: Whether the verb needs it.
-        positional: Whether it is given without a name.
-    """
+    """An option as the help shows it; `form` is the option with its value: "--seed N"."""
 
     form: str
     text: str

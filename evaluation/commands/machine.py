@@ -59,7 +59,8 @@ class Bench(SensorOption, SeedOption, Verb):
         parts = self._parts(names)
         expected_s = work_s(self._recorded_s() * RENDER_S_PER_S, self.workers())
         expected_s += PLAY_S + parts * seconds
-        announce(f"times {len(names)} rows on 1 and {self.workers()} cores", expected_s)
+        cores = "1 core" if self.workers() == 1 else f"1 and {self.workers()} cores"
+        announce(f"times {len(names)} rows on {cores}", expected_s)
         with (
             tempfile.TemporaryDirectory(prefix="airground-bench-") as scratch,
             step("benchmark", parts, "parts") as benchmark,

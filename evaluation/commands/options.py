@@ -18,19 +18,13 @@ from airground.errors import InputError
 from evaluation.setup.environment import usable_cores
 
 if TYPE_CHECKING:
-    from airground.config import Config
     from evaluation.setup.settings import Settings
     from evaluation.setup.setups import Setup
 
 
 @dataclass(frozen=True)
 class Shown:
-    """How the help shows an option.
-
-    Attributes:
-        metavar: Form of the value.
-        default: What holds without the option, in words; empty for the field's default.
-    """
+    """How the help shows an option; an empty `default` stands for the field's own."""
 
     metavar: str
     default: str = ""
@@ -38,11 +32,7 @@ class Shown:
 
 @dataclass(frozen=True, kw_only=True)
 class Verb(ABC):
-    """A verb of the command line.
-
-    Attributes:
-        heading: Heading in the help of the group that a class's options belong to.
-    """
+    """A verb of the command line; `heading` is that of a class's options in the help."""
 
     heading: ClassVar[str] = "machine"
 
@@ -135,9 +125,6 @@ class ConfigOptions:
         from evaluation.setup.settings import resolve_all
 
         return resolve_all(self.preset, self.config, self.overrides, heading, self.sections)
-
-    def resolved_config(self) -> Config:
-        return self.settings().pipeline()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,13 +12,7 @@ from tyro.conf import Positional
 
 from airground.errors import InputError
 from evaluation.commands.estimates import RUN_S_PER_S, START_S, recorded
-from evaluation.commands.options import (
-    OutOption,
-    PipelineOptions,
-    SeedOption,
-    Shown,
-    Verb,
-)
+from evaluation.commands.options import OutOption, PipelineOptions, SeedOption, Shown, Verb
 
 if TYPE_CHECKING:
     from airground.core.cloud import Source
@@ -178,9 +172,7 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
                 if close_up is not None:
                     onlookers.append(close_up)
                 result = run_recording(recording, truth, setup, seed, drops, onlookers, apart=True)
-            showcase = (
-                None if close_up is None else close_up.showcase(result.tracked, result.augmented)
-            )
+            showcase = close_up and close_up.showcase(result.tracked, result.augmented)
             summary = write_measured(folder, recording, result, drops, setup, seed, showcase)
         print_summary(summary)
 

@@ -95,13 +95,9 @@ class Track(ConfigOptions, SeedOption, OutOption, Verb):
     def _front_end(self, name: str, recording: RobotRecording[Any]) -> FrontEnd[Any]:
         import numpy as np
 
-        from airground.core.cloud import Source
         from airground.io.tum import read_tum
-        from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
+        from evaluation.run.front_ends import named_front_end
 
         rng = np.random.default_rng(self.checked_seed())
         poses = None if self.trajectory is None else read_tum(self.trajectory)
-        given = Ingredients(recording.calibration, self.resolved_config(), rng, poses)
-        if recording.robot is Source.MAV:
-            return make_front_end(MAV, name, given)
-        return make_front_end(GROUND, name, given)
+        return named_front_end(recording, name, self.settings().pipeline(), rng, poses)

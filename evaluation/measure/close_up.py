@@ -39,13 +39,7 @@ PANELS = 3
 
 
 class CloseUp:
-    """An onlooker that keeps the first aerial maps of a run, from depth maps to particles.
-
-    Args:
-        recording: Source of the images.
-        truth: Reference for the errors.
-        setup: Configuration of the pipeline.
-    """
+    """An onlooker that keeps the first aerial maps of a run, from depth maps to particles."""
 
     def __init__(self, recording: Recording, truth: Truth, setup: Setup) -> None:
         self._recording, self._truth, self._setup = recording, truth, setup
@@ -72,18 +66,12 @@ class CloseUp:
             self._keep_localization(seen)
 
     def showcase(
-        self,
-        tracked: dict[str, Tracked],
-        augmented: AugmentedMap,
-        match_seed: int | None = None,
+        self, tracked: dict[str, Tracked], augmented: AugmentedMap, match_seed: int | None = None
     ) -> Showcase | None:
         """The data gathered, after the run; None if no aerial map was located.
 
-        Args:
-            tracked: Answers of the front ends, by robot ("mav", "ground").
-            augmented: The augmented map at the end of the run.
-            match_seed: Seed of the prior pose that chooses ground views for matches by ASIFT;
-                None leaves out the matches, which take seconds.
+        `match_seed` is that of the prior pose that chooses ground views for matches by ASIFT; None
+        leaves out the matches, which take seconds.
         """
         if self._first is None:
             return None
@@ -166,13 +154,8 @@ class CloseUp:
             alignment = self._first_alignment.alignment
         else:
             surface, start = sighting.surface, self._steps[0].belief.T_ground_mav
-            alignment = refine(
-                surface.stamp_ns,
-                start,
-                surface.cloud_mav,
-                sighting.ground_cloud,
-                self._setup.config,
-            )
+            clouds = surface.cloud_mav, sighting.ground_cloud
+            alignment = refine(surface.stamp_ns, start, *clouds, self._setup.config)
         return alignment.T_ground_mav if alignment.accepted else None
 
 

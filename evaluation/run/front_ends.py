@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from airground.config import Config
 from airground.core.cloud import Source
 from airground.core.messages import GroundImage, MavImage
+from airground.core.trajectory import Trajectory
 from airground.io.recording import Recording
-from airground.io.robot_recording import Pair
+from airground.io.robot_recording import Pair, RobotRecording
+from airground.slam.front_end import FrontEnd
 from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
 from airground.tracking import FrontEnds
 from evaluation.setup.setups import Setup
@@ -71,18 +74,31 @@ def front_ends_for(
     if oracles and way["mav"] == "oracle":
         mav = oracles.mav
     else:
-        calibration = recording.mav.calibration
-        needs = Ingredients(calibration, setup.config, mav_rng, given.mav)
-        mav = make_front_end(MAV, way["mav"], needs)
+        mav = named_front_end(recording.mav, way["mav"], setup.config, mav_rng, given.mav)
     if oracles and way["ground"] == "oracle":
         ground = oracles.ground
     else:
-        needs = Ingredients(recording.ground.calibration, setup.config, ground_rng, given.ground)
-        ground = make_front_end(GROUND, way["ground"], needs)
+        ground = named_front_end(
+            recording.ground, way["ground"], setup.config, ground_rng, given.ground
+        )
     # Thread time: waits for a core that another process holds do not count.
     clock = time.thread_time
     watched = WatchedFrontEnd(mav, clock), WatchedFrontEnd(ground, clock)
     return WatchedFrontEnds(*watched, setup.slam_robots())
+
+
+def named_front_end(
+    recording: RobotRecording[Any],
+    name: str,
+    config: Config,
+    rng: np.random.Generator,
+    trajectory: Trajectory | None,
+) -> FrontEnd[Any]:
+    """The front end of one robot by its name in the tables of `airground.slam.front_ends`."""
+    needs = Ingredients(recording.calibration, config, rng, trajectory)
+    if recording.robot is Source.MAV:
+        return make_front_end(MAV, name, needs)
+    return make_front_end(GROUND, name, needs)
 
 
 def truth_for(setup: Setup, recording: Path) -> Truth | None:

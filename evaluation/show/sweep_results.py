@@ -25,14 +25,7 @@ from evaluation.measure.work.code_version import code_version
 from evaluation.setup.run_info import RunInfo
 from evaluation.setup.settings import write_config
 from evaluation.setup.text import MISSING, TextTable, percent, print_table
-from evaluation.show.figures.style import (
-    LABEL_PT,
-    SERIES,
-    SMALL_PT,
-    WIDE_IN,
-    save_figure,
-    styled,
-)
+from evaluation.show.figures.style import LABEL_PT, SERIES, SMALL_PT, WIDE_IN, save_figure, styled
 
 TABLE, SWEEP, CONFIG, FIGURES = "results.parquet", "sweep.json", "config.toml", "figures"
 SCHEMA, VERSION = "airground-sweep", 1

@@ -94,13 +94,13 @@ def median_interval(values: ArrayLike, rng: np.random.Generator, resamples: int 
     return Interval(quantile(array, 0.5), quantile(medians, 0.025), quantile(medians, 0.975))
 
 
-def wilson(successes: int, total: int, z: float = 1.959964) -> Rate:
-    """A success rate with its Wilson score interval (right also at 0 and 100 %)."""
+def wilson(successes: int, total: int) -> Rate:
+    """A success rate with its 95 % Wilson score interval (right also at 0 and 100 %)."""
     if not 0 <= successes <= total:
         raise ValueError(f"successes must lie in [0, {total}], got {successes}")
     if total == 0:
         return Rate(0, 0, 0.0, 1.0)
-    p = successes / total
+    p, z = successes / total, 1.959964
     centre = (p + z**2 / (2 * total)) / (1 + z**2 / total)
     half = z / (1 + z**2 / total) * np.sqrt(p * (1 - p) / total + z**2 / (4 * total**2))
     return Rate(successes, total, max(0.0, float(centre - half)), min(1.0, float(centre + half)))

@@ -16,6 +16,7 @@ from airground.core.arrays import read_only
 from airground.errors import InputError
 
 DEGREE = 5
+ROUNDING_S = 0.5  # step of a path's spline where none is given
 # The quintic B-spline of independent unit normals has this standard deviation at a knot.
 _NOISE_GAIN = float(np.sqrt(np.sum((np.array([1, 26, 66, 26, 1]) / 120) ** 2)))
 
@@ -81,7 +82,7 @@ class WaypointPath:
 
 
 def planar_path(
-    waypoints: ArrayLike, speed_mps: float, start_s: float, rounding_s: float = 0.5
+    waypoints: ArrayLike, speed_mps: float, start_s: float, rounding_s: float = ROUNDING_S
 ) -> WaypointPath:
     """A path over (x, y) waypoints whose speed never exceeds `speed_mps`.
 
@@ -102,7 +103,7 @@ def planar_path(
 
 
 def heading_path(
-    waypoints: ArrayLike, speed_mps: float, turn_rps: float, start_s: float, rounding_s: float = 0.5
+    waypoints: ArrayLike, speed_mps: float, turn_rps: float, start_s: float
 ) -> WaypointPath:
     """A path over (x, y, heading) waypoints that keeps to a speed and a yaw rate.
 
@@ -114,13 +115,12 @@ def heading_path(
         speed_mps: Limit of the speed.
         turn_rps: Limit of the yaw rate [rad/s].
         start_s: Time at which the motion starts [s].
-        rounding_s: Step of the spline: a corner is rounded within about twice this time.
 
     Raises:
         InputError: As for `planar_path`, or a yaw rate that is not positive.
     """
     points, durations = _timed_headings(waypoints, speed_mps, turn_rps)
-    return _timed_path(points, durations, start_s, rounding_s)
+    return _timed_path(points, durations, start_s, ROUNDING_S)
 
 
 def cut_headings(

@@ -28,7 +28,7 @@ from evaluation.run.live.playback import (
     RobotReport,
     play_robot,
 )
-from evaluation.run.onlooker import Onlooker, Seen
+from evaluation.run.onlooker import Seen
 from evaluation.run.recording import RunResult, RunRows
 from evaluation.run.robot_process import RobotProcess, RobotTask
 from evaluation.run.tracking import TrackingReport, localizer_rng
@@ -97,19 +97,9 @@ class LiveLog:
 
 
 def run_live(
-    recording: Recording,
-    truth: Truth,
-    setup: Setup,
-    seed: int,
-    playback: Playback,
-    onlookers: tuple[Onlooker, ...] = (),
+    recording: Recording, truth: Truth, setup: Setup, seed: int, playback: Playback
 ) -> tuple[RunResult, DropList]:
-    """Play a recording at its own rate through the pipeline.
-
-    Args:
-        recording, truth, setup, seed: As in `run_recording`.
-        playback: Rate, sizes of the queues, and the radio.
-        onlookers: Consumers of every event; their time delays the mapper.
+    """Play a recording at its own rate through the pipeline, otherwise as `run_recording`.
 
     Returns:
         The result of a run, with the rows of `add_live_rows`; and the drop list with which a run
@@ -121,7 +111,7 @@ def run_live(
     rows = RunRows(recording, truth, setup)
     pipeline = pipeline_for(recording, setup, localizer_rng(seed, recording.flight))
     with LiveTracking(recording, setup, seed, playback) as tracking:
-        driven = drive(recording, tracking, pipeline, setup, [tracking, rows, *onlookers])
+        driven = drive(recording, tracking, pipeline, setup, [tracking, rows])
         log = tracking.log
     add_live_rows(rows.out, recording, log, playback)
     result = rows.result(driven.tracked, pipeline.augmented_map())

@@ -24,11 +24,7 @@ NOMINAL = np.linspace(0.01, 0.99, 99)
 
 @styled
 def calibration_figure(found: Localizations) -> Figure:
-    """Nominal against observed coverage, and spread against error; accepted ones apart.
-
-    Args:
-        found: At least one localization.
-    """
+    """Nominal against observed coverage, and spread against error, of at least one localization."""
     figure = Figure(figsize=(WIDE_IN, 3.5), layout="constrained")
     left, right = figure.subplots(1, 2)
     _coverage(left, found)

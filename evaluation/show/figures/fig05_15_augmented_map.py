@@ -54,12 +54,7 @@ def augmented_figure(robot_view: NDArray[np.uint8], aerial_view: NDArray[np.uint
 
 @styled
 def refinement_figure(showcase: Showcase, T_ground_mav: SE3) -> Figure:
-    """Both maps cut along x, with the aerial surface as placed by the particles and by ICP.
-
-    Args:
-        showcase: Source of the surface, the first belief and the ground robot's map.
-        T_ground_mav: Refined alignment of the surface.
-    """
+    """Both maps cut along x, with the aerial surface as placed by the particles and by ICP."""
     aerial, ground = showcase.surface.cloud_mav.points, showcase.ground_cloud.points
     y = _fullest_cut(ground, T_ground_mav @ aerial)
     figure = Figure(figsize=(WIDE_IN, 3.9), layout="constrained")

@@ -48,16 +48,7 @@ def refinement_angle_figure(trials: Trials, colours: Sequence[str] = SERIES) -> 
 def _before_after_figure(
     trials: Trials, colours: Sequence[str], title: str, paper: float, unit: str, floor: float
 ) -> Figure:
-    """Boxes before and after, with the paper's median after refinement as a line.
-
-    Args:
-        trials: Errors by condition, in `unit`.
-        colours: Colour of each condition.
-        title: Quantity and unit.
-        paper: The paper's median after refinement, in `unit`.
-        unit: Unit in the label of that line.
-        floor: Smallest value on the axis, in `unit`.
-    """
+    """Boxes before and after, with the paper's median after refinement as a line."""
     figure = Figure(figsize=(COLUMN_IN, 3.8), layout="constrained")
     axes = figure.subplots()
     boxes = {

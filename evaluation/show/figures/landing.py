@@ -40,12 +40,7 @@ class Frame:
 
 
 def landing(showcase: Showcase, T_ground_mav: SE3) -> Iterator[Frame]:
-    """The surface falls to where the particles place it, and moves to where refinement does.
-
-    Args:
-        showcase: Source of the surface, its first belief and the ground robot's map.
-        T_ground_mav: Refined alignment of the surface.
-    """
+    """The surface falls to where the particles place it, and moves to where refinement does."""
     above = _both_views(showcase)
     guess = showcase.steps[0].belief.T_ground_mav
     high = SE3(guess.rotation, guess.translation + np.array([0.0, 0.0, FALL_M]))

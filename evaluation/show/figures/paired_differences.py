@@ -44,13 +44,7 @@ class Panel:
 def paired_differences_figure(
     panels: Sequence[Panel], labels: Sequence[str], colours: Sequence[str]
 ) -> Figure:
-    """One panel per metric, one column of dots per run; the side that is worse is shaded.
-
-    Args:
-        panels: At least one metric.
-        labels: Name of each run, in the order of every panel's.
-        colours: Colour of each run.
-    """
+    """One panel per metric, one column of dots per run; the side that is worse is shaded."""
     rows = -(-len(panels) // COLUMNS)
     figure = Figure(figsize=(WIDE_IN, 1.7 * rows + 0.25), layout="constrained")
     grid = figure.subplots(rows, COLUMNS, squeeze=False).ravel()

@@ -29,12 +29,16 @@ GROUND_PATH: Colour = (34, 94, 214)
 MAV_PATH: Colour = (20, 158, 78)
 BACKGROUND: Colour = (250, 250, 248)
 
+SIZE_PX = (1440, 960)
+"""Width and height of a picture [px]."""
 FIELD_OF_VIEW = np.radians(52.0)
 MARKER_M = 0.22
 """Width of a camera's pyramid [m]."""
 PATH_RADIUS_M = 0.012
 FAR_M = 60.0
 """Far plane [m]: beyond every scene."""
+DARKENING = 9.0
+"""Strength of eye-dome lighting."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +71,7 @@ def robot_viewpoint(showcase: Showcase) -> Viewpoint:
     return Viewpoint(eye, target)
 
 
-def aerial_viewpoint(showcase: Showcase, aspect: float = 1.5) -> Viewpoint:
+def aerial_viewpoint(showcase: Showcase) -> Viewpoint:
     """High above, from the side opposite to the ground robot, with everything in view."""
     target = _centre(showcase.aerial_cloud)
     away = target[:2] - showcase.ground_path.translations[:, :2].mean(axis=0)
@@ -79,26 +83,18 @@ def aerial_viewpoint(showcase: Showcase, aspect: float = 1.5) -> Viewpoint:
     if len(showcase.aerial_cloud):
         shown.append(np.percentile(showcase.aerial_cloud.points, [1, 99], axis=0))
     points = np.concatenate(shown) - target
-    reach = np.maximum(np.abs(points @ up), np.abs(points @ right) / aspect)
+    reach = np.maximum(np.abs(points @ up), np.abs(points @ right) / (SIZE_PX[0] / SIZE_PX[1]))
     distance = (points @ back + 1.06 * reach / np.tan(FIELD_OF_VIEW / 2)).max()
     return Viewpoint(target + distance * back, target)
 
 
 def render_augmented_map(
-    showcase: Showcase, view: Viewpoint, size: tuple[int, int] = (1440, 960)
+    showcase: Showcase, view: Viewpoint, size_px: tuple[int, int] = SIZE_PX
 ) -> NDArray[np.uint8]:
-    """Draw both clouds, both paths and the cameras.
+    """(height, width, 3) picture of both clouds, both paths and the cameras.
 
     Ground points are red, aerial points grey; the ground robot's path and cameras are
     blue, the MAV's green.
-
-    Args:
-        showcase: Source of clouds and paths.
-        view: Camera of the picture.
-        size: Width and height of the picture [px].
-
-    Returns:
-        (height, width, 3) uint8.
     """
     os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
     import pyrender
@@ -118,7 +114,7 @@ def render_augmented_map(
         scene.add(_tubes(edges, 0.8 * PATH_RADIUS_M, colour))
     scene.add(pyrender.PerspectiveCamera(yfov=FIELD_OF_VIEW, znear=0.1, zfar=FAR_M), pose=pose)
 
-    renderer = pyrender.OffscreenRenderer(*size)
+    renderer = pyrender.OffscreenRenderer(*size_px)
     try:
         colour_image, depth = renderer.render(scene)
     finally:
@@ -217,21 +213,13 @@ def _mesh(positions: NDArray, triangles: NDArray, colours: NDArray) -> pyrender.
     return pyrender.Mesh(primitives=[primitive])
 
 
-def _eye_dome_lighting(
-    colours: NDArray[np.uint8], depth: NDArray[np.float32], strength: float = 9.0
-) -> NDArray[np.uint8]:
-    """Darken pixels behind a nearer neighbour, at two scales.
-
-    Args:
-        colours: (height, width, 3).
-        depth: (height, width) [m], 0 where there is nothing.
-        strength: Factor of the darkening.
-    """
+def _eye_dome_lighting(colours: NDArray[np.uint8], depth: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Darken pixels behind a nearer neighbour, at two scales; depth [m] is 0 in the background."""
     far = np.log(np.where(depth > 0, depth, FAR_M)).astype(np.float32)
     darkness = np.zeros_like(far)
     for radius in (1, 4):
         for shift in ((0, radius), (0, -radius), (radius, 0), (-radius, 0)):
             nearer = far - np.roll(far, shift, axis=(0, 1))
             darkness += np.clip(nearer, 0, 0.12)
-    shade = np.where(depth > 0, np.exp(-strength * darkness / 4), 1.0)
+    shade = np.where(depth > 0, np.exp(-DARKENING * darkness / 4), 1.0)
     return (colours * shade[..., None]).round().astype(np.uint8)

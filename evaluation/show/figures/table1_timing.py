@@ -66,13 +66,7 @@ def timing_figure(durations_ms: dict[str, NDArray[np.float64]]) -> Figure:
 def time_ratio_figure(
     ratios: dict[str, list[float | None]], labels: Sequence[str], colours: Sequence[str]
 ) -> Figure:
-    """One row per stage, one dot per run; the line is the reference.
-
-    Args:
-        ratios: Title of a stage -> its ratio in each run, None if not measured.
-        labels: Name of each run.
-        colours: Colour of each run.
-    """
+    """One row per stage, one dot per run; the line is the reference; None was not measured."""
     figure = Figure(figsize=(WIDE_IN, 0.27 * len(ratios) + 0.95), layout="constrained")
     axes = figure.subplots()
     axes.axvline(1.0, color=INK, linewidth=1.0)

@@ -15,7 +15,7 @@ from evaluation.judge.results import CONFIG, SHOWCASE, SUMMARY, TABLE, Results
 from evaluation.judge.summary import Summary, build_summary
 from evaluation.measure.showcase import Showcase
 from evaluation.setup import published
-from evaluation.setup.condition import Condition, shared_parts
+from evaluation.setup.condition import shared_parts
 from evaluation.setup.run_info import RunInfo
 from evaluation.setup.settings import write_config
 from evaluation.show.figures.style import ReportFigure, save_figure
@@ -49,22 +49,21 @@ def write_report(
     table: ResultTable,
     showcase: Showcase | None,
     run: RunInfo,
-    conditions: Sequence[Condition] | None = None,
     notes: Sequence[str] = (),
 ) -> None:
     """Write `report.html` and `figures/` (PNG and PDF) into `out`.
+
+    The primary condition, those of the other preset and then the rest are drawn side by side
+    (four at most); all stand in the comparison.
 
     Args:
         out: Folder of the run; made where missing.
         table: Everything that was measured.
         showcase: What the pictures are drawn from; None leaves them out.
         run: Where the results come from.
-        conditions: What to show, the primary one first; None shows all of the table. The
-            primary one, those of the other preset and then the rest are drawn side by side
-            (four at most); all stand in the comparison.
         notes: Sentences that the page lists at its end.
     """
-    shown = list(conditions) if conditions is not None else table.conditions()
+    shown = table.conditions()
     primary = table.of(shown[0])
     measured = primary.without_controls()
     page = rendered(

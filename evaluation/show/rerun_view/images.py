@@ -99,11 +99,7 @@ def pinhole(
 ) -> rr.Pinhole:
     """A camera for images of another size; rerun counts pixels from the image's corner.
 
-    Args:
-        camera: Camera of the full image.
-        scale: Size of the drawn image, as a share of the full one.
-        frames: Frames of the camera and of its image.
-        colour: Colour of the frustum.
+    `scale` is a share of the full size; `frames` are those of the camera and of its image.
     """
     return rr.Pinhole(
         focal_length=(scale * camera.fx, scale * camera.fy),

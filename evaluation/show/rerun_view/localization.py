@@ -12,13 +12,7 @@ from evaluation.run.onlooker import Seen
 from evaluation.show.figures.fig08_particles import PARTICLES, ellipse_points
 from evaluation.show.figures.style import COST_COLOURS, HEIGHT_COLOURS, value_range
 from evaluation.show.rerun_view.images import coloured
-from evaluation.show.rerun_view.sensor_stream import (
-    COSTS,
-    TRUTH,
-    TRUTH_COLOUR,
-    SensorStream,
-    rgb,
-)
+from evaluation.show.rerun_view.sensor_stream import COSTS, TRUTH, TRUTH_COLOUR, SensorStream, rgb
 from evaluation.table.truth_errors import true_T_ground_mav
 from sim.recording.truth import Truth
 

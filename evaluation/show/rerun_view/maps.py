@@ -7,12 +7,7 @@ import rerun as rr
 
 from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
-from airground.core.events import (
-    Aligned,
-    BeliefUpdated,
-    GroundMapExtended,
-    MapAugmented,
-)
+from airground.core.events import Aligned, BeliefUpdated, GroundMapExtended, MapAugmented
 from airground.core.messages import GroundImage
 from airground.core.se3 import SE3, interpolate
 from airground.core.voxel_map import VoxelMap

@@ -72,13 +72,7 @@ class GrowingPath:
 class MovingCamera:
     """A camera and its path, drawn at the rates of a level.
 
-    Args:
-        stream: Output.
-        level: Rates.
-        frames: Names of the frame that it moves in, and of its own frame.
-        entities: Entities of the camera and of the path.
-        colour: Colour of the path.
-        radius_m: Radius of the path [m].
+    `frames` are the one that it moves in and its own; `entities` are the camera's and the path's.
     """
 
     def __init__(

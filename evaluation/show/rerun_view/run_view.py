@@ -32,15 +32,9 @@ EYE_M, TARGET_M = (-2.9, -3.4, 4.3), (1.3, 0.7, 0.2)
 
 
 class RunView:
-    """An onlooker that writes a run for the viewer.
+    """An onlooker that writes a run to an .rrd file, and to a viewer that listens at an address.
 
-    Args:
-        path: The .rrd file to write.
-        name: Name of the run in the viewer.
-        calibrations: Calibration of each robot, which shapes its frustum.
-        truth: Ground truth; None leaves out errors and everything else under `/truth`.
-        level: Level of detail.
-        viewer: Address of a viewer that listens; None for none.
+    Without truth, errors and everything else under `/truth` are left out.
     """
 
     def __init__(

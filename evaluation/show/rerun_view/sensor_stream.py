@@ -36,15 +36,9 @@ _AT_ONCE = rr.ChunkBatcherConfig(flush_tick=0.05)
 
 
 class SensorStream:
-    """Writes to a file, and to a viewer if there is one.
+    """Writes to an .rrd file, and to a viewer if one listens at an address ("rerun+http://...").
 
     The file contains the layout, so that every viewer opens it in the same way.
-
-    Args:
-        path: The .rrd file to write.
-        name: Name of the recording in the viewer.
-        layout: Panels of the viewer.
-        viewer: Address of a viewer that listens ("rerun+http://..."); None for none.
     """
 
     def __init__(

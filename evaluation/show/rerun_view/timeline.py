@@ -22,14 +22,7 @@ from airground.core.events import (
 from airground.core.se3 import SE3
 from evaluation.run.onlooker import STAGE_OF, Seen
 from evaluation.show.figures.style import SERIES
-from evaluation.show.rerun_view.sensor_stream import (
-    ROBOT,
-    TRUTH,
-    Level,
-    SensorStream,
-    paces,
-    rgb,
-)
+from evaluation.show.rerun_view.sensor_stream import ROBOT, TRUTH, Level, SensorStream, paces, rgb
 from evaluation.table.truth_errors import BothPoses, pose_error
 from sim.recording.truth import Truth
 

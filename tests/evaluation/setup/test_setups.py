@@ -73,6 +73,7 @@ def test_setups_share_maps_where_only_later_stages_differ() -> None:
     exact = Setup(Config(), "oracle")
     assert exact.maps_like(replace(other_slam, poses="oracle"))
     assert not exact.maps_like(Setup(Config(), "oracle", PAPER_DRIFT))
+    assert not exact.maps_like(searched)
 
 
 def test_drift_needs_an_oracle() -> None:
