@@ -172,7 +172,9 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
                 if close_up is not None:
                     onlookers.append(close_up)
                 result = run_recording(recording, truth, setup, seed, drops, onlookers, apart=True)
-            showcase = close_up and close_up.showcase(result.tracked, result.augmented)
+            showcase = (
+                None if close_up is None else close_up.showcase(result.tracked, result.augmented)
+            )
             summary = write_measured(folder, recording, result, drops, setup, seed, showcase)
         print_summary(summary)
 
