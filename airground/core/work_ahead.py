@@ -24,11 +24,8 @@ def read_ahead(
 ) -> Generator[Item]:
     """What `read` gives for each argument, in order; it raises where `read` does.
 
-    Args:
-        pool: Pool whose threads read.
-        read: Function to call; its calls are independent, unless the pool has one thread.
-        arguments: Arguments of the calls, in order.
-        ahead: Most reads that are done or under way ahead of use.
+    At most `ahead` reads are done or under way ahead of use. They are independent of each other,
+    unless the pool has one thread.
     """
     waiting: deque[Future[Item]] = deque()
     try:
@@ -46,11 +43,7 @@ def read_ahead(
 def run_ahead(items: Iterable[Item], ahead: int) -> Generator[Item]:
     """The same items, produced in a thread of their own; raises where `items` does.
 
-    Producer and consumer must share no mutable state.
-
-    Args:
-        items: Items, produced one after another in that thread.
-        ahead: Most items that wait to be taken.
+    At most `ahead` of them wait to be taken. Producer and consumer must share no mutable state.
     """
     iterator = iter(items)
     with ThreadPoolExecutor(1) as pool:

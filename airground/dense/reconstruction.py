@@ -39,10 +39,6 @@ class DenseReconstruction:
     left the radius; then the depth map is made. Depth maps near the first of a surface are
     collected until one lies outside; then they are fused and cast into the view in their
     middle. Each stage yields its event right after its work.
-
-    Args:
-        camera: Camera of the full-resolution images.
-        config: Configuration; `view_selection`, `plane_sweep` and `fusion` are used.
     """
 
     def __init__(self, camera: PinholeCamera, config: Config) -> None:

@@ -142,7 +142,6 @@ class GroundMap:
                 self._fuse(keyframe, *images)
 
     def _fuse(self, keyframe: GroundKeyframe, depth: F32, colour: U8) -> None:
-        """Put a keyframe's images into the distance field."""
         self._fused += 1
         config, pose = self._config, keyframe.T_ground_camera
         camera, voxel_m, truncation_m = self._camera, config.voxel_m, config.truncation_m
@@ -152,7 +151,6 @@ class GroundMap:
 
 
 def _corrected(keyframe: GroundKeyframe, trajectory: Trajectory) -> GroundKeyframe:
-    """The keyframe where the trajectory has it."""
     index = int(np.searchsorted(trajectory.stamps_ns, keyframe.stamp_ns))
     if index == len(trajectory) or trajectory.stamps_ns[index] != keyframe.stamp_ns:
         return keyframe

@@ -61,16 +61,10 @@ def blocks_along_rays(
     truncation_m: np.float32,
     max_depth_m: np.float32,
 ) -> tuple[I32, int]:
-    """The blocks of points on both sides of what each pixel measured, one after another.
+    """Room for blocks (M, 3) on both sides of what each pixel measured, and their number.
 
-    Args:
-        depth: Depth image as in `touched_blocks`.
-        inverse: (4,) inverse intrinsics 1 / fx, 1 / fy, cx, cy.
-        T_map_camera: (3, 4) upper rows of the pose.
-        block_m, truncation_m, max_depth_m: Lengths as in `touched_blocks` [m].
-
-    Returns:
-        Room for blocks (M, 3), and how many there are.
+    Arguments are as of `touched_blocks`; `inverse` (4,) holds 1 / fx, 1 / fy, cx, cy, and
+    `T_map_camera` (3, 4) the upper rows of the pose.
     """
     rows, columns = depth.shape[0] // STRIDE, depth.shape[1] // STRIDE
     blocks = np.empty((rows * columns * (STEPS + 1), 3), np.int32)

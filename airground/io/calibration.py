@@ -13,11 +13,10 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from airground.core.camera import PinholeCamera
 from airground.core.messages import ImuNoise, RobotCalibration
-from airground.core.se3 import SE3
+from airground.core.se3 import ROTATION_TOLERANCE, SE3
 
 Positive = Annotated[float, Field(gt=0)]
 Row = tuple[float, float, float, float]
-ROTATION_TOLERANCE = 1e-6
 MAX_SIDE_PX = 8192
 """Largest side of an image [px]: images are decoded and undistorted whole."""
 

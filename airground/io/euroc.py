@@ -21,11 +21,7 @@ CAMERA_COLUMNS = "#timestamp [ns],filename"
 
 
 def read_imu(path: Path) -> ImuSamples:
-    """Read gyro [rad/s] and accelerometer [m/s^2] samples.
-
-    Raises:
-        RecordingError: Names the file and the first stamp or line that is wrong.
-    """
+    """Read gyro [rad/s] and accelerometer [m/s^2] samples; RecordingError where one is wrong."""
     stamps, values = _read_samples(path, 6)
     return ImuSamples(stamps, values[:, :3], values[:, 3:])
 
@@ -46,11 +42,7 @@ def write_magnetic(path: Path, samples: MagneticSamples) -> None:
 
 
 def read_image_list(path: Path) -> tuple[I64, list[str]]:
-    """Stamps (N,) [ns] and file names of a camera's images.
-
-    Raises:
-        RecordingError: Names the file and the line or stamp that is wrong.
-    """
+    """Stamps (N,) [ns] and file names of a camera's images; RecordingError where one is wrong."""
     stamps, names = [], []
     for number, line in enumerate(read_lines(path), start=1):
         if not line or line.startswith("#"):

@@ -52,20 +52,12 @@ class Header(Table):
 
 
 def read_header(path: Path) -> Header:
-    """Read and check `recording.toml`.
-
-    Raises:
-        RecordingError: The file is missing, of another schema, or a key is wrong.
-    """
+    """Read `recording.toml`; RecordingError if it is missing, of another schema or wrong."""
     tables = read_toml(path)
     schema = tables.get("schema")
     if schema != SCHEMA:
         raise RecordingError(f"{path}: schema is {schema!r}, this version reads {SCHEMA}")
     return parse_table(Header, tables, path)
-
-
-def write_header(path: Path, header: Header) -> None:
-    write_toml(path, header)
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -69,15 +69,10 @@ def _listing(folder: Path) -> list[Path]:
 
 
 def listed_files(folder: Path, names: Iterable[str], list_path: Path) -> list[Path]:
-    """The files that a list names; a list from elsewhere must not lead out of its folder.
-
-    Args:
-        folder: Folder that the names are relative to.
-        names: Names as they stand in the list.
-        list_path: The list, for the message.
+    """The files below `folder` that the list at `list_path` names.
 
     Raises:
-        RecordingError: A name leads out of the folder.
+        RecordingError: A name leads out of the folder, as in a list from elsewhere.
     """
     files = []
     for name in names:

@@ -35,16 +35,11 @@ class Lens:
 
     def matrix(self) -> F64:
         """The (3, 3) intrinsic matrix."""
-        fx, fy, cx, cy = self.intrinsics
-        return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
+        return PinholeCamera(self.width, self.height, *self.intrinsics).matrix()
 
 
 class Undistortion:
-    """Turns images through a lens into images of the pinhole camera `camera`.
-
-    Args:
-        lens: The lens.
-    """
+    """Turns images through a lens into images of the pinhole camera `camera`."""
 
     def __init__(self, lens: Lens) -> None:
         self._maps: tuple[NDArray[Any], NDArray[Any]] | None = None

@@ -117,15 +117,12 @@ class Inertial:
 
 
 def read_inertial(folder: Path, T_body_camera: SE3, camera_stamps_ns: I64) -> Inertial:
-    """Read `imu0`, and check that it fits the images.
+    """Read the folder `imu0`, and check that it fits the images; raises like `open_euroc`.
 
     Args:
         folder: The folder `imu0`.
         T_body_camera: Pose of the camera in the body of `T_BS`.
         camera_stamps_ns: (N,) stamps of the images [ns].
-
-    Raises:
-        RecordingError: One line that names file, key or stamp and what would be right.
     """
     imu_file, sensor_file = folder / "data.csv", folder / "sensor.yaml"
     T_imu_camera = _in_imu(read_pose(sensor_file), T_body_camera)

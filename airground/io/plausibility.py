@@ -89,8 +89,7 @@ def check_imu_covers(
 def upwards(imu: ImuSamples, imu_path: Path) -> F64:
     """(3,) unit vector that points up in the IMU as the recording starts.
 
-    Raises:
-        RecordingError: The accelerometer does not read gravity in m/s^2.
+    RecordingError if the accelerometer does not read gravity in m/s^2.
     """
     usual = float(np.median(np.linalg.norm(imu.accelerometer, axis=1)))
     low, high = GRAVITY_RANGE

@@ -126,11 +126,7 @@ class Recording(Pair):
         return self.header.calibration.ground.depth.units_per_m
 
     def verify(self) -> None:
-        """Compare every file with the digests in `recording.toml`.
-
-        Raises:
-            RecordingError: Names the first file or image folder that differs.
-        """
+        """RecordingError names the first file or image folder unlike its digest in the header."""
         digests = self.header.digests
         places = listed_files(self.path, digests, self.path / layout.HEADER)
         for place, digest in zip(places, digests.values(), strict=True):
@@ -158,7 +154,6 @@ class Recording(Pair):
 def _robot(
     path: Path, robot: Source, table: RobotTable, stamps: I64, read_image: Callable[[int], Image]
 ) -> RobotRecording[Image]:
-    """One robot's part of the recording."""
     is_mav, calibration = robot == Source.MAV, table.calibration()
     magnetometer = layout.MAV_MAGNETOMETER_DATA if is_mav else layout.GROUND_MAGNETOMETER_DATA
     return RobotRecording(

@@ -12,7 +12,7 @@ from airground.io import layout
 from airground.io.calibration import RobotTable
 from airground.io.digests import file_digest, folder_digest
 from airground.io.euroc import camera_yaml, sensor_yaml, write_image_list, write_imu, write_magnetic
-from airground.io.header import Header, write_header
+from airground.io.header import Header, write_toml
 from airground.io.tum import format_stamp, write_accelerometer, write_image_lists
 
 
@@ -67,7 +67,7 @@ def finish(root: Path, header: Header, image_digests: Mapping[str, Mapping[str, 
         if path.is_file() and parent not in digests and relative.parts[0] != layout.TRUTH:
             digests[relative.as_posix()] = file_digest(path)
     complete = header.model_copy(update={"digests": dict(sorted(digests.items()))})
-    write_header(root / layout.HEADER, complete)
+    write_toml(root / layout.HEADER, complete)
 
 
 def _write_samples(

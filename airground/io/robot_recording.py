@@ -126,9 +126,7 @@ class RobotRecording(Generic[Image]):
     ) -> Iterator[tuple[int, list[Stamped]]]:
         """Each image's stamp, and the image after the samples since the one before it.
 
-        Args:
-            pool: Reads images ahead.
-            dropped: Stamps [ns] of images to leave out.
+        The pool reads images ahead; those with `dropped` stamps [ns] are left out.
         """
         bundler = self.bundler()
         stamps = self.camera_stamps.tolist()
@@ -162,7 +160,6 @@ class Pair:
             )
 
     def of(self, robot: Source) -> RobotRecording[Any]:
-        """The recording of one robot."""
         return self.mav if robot == Source.MAV else self.ground
 
     def messages(

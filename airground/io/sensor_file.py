@@ -60,8 +60,7 @@ def read_mapping(path: Path) -> dict[str, Any]:
 def read_lens(path: Path) -> Lens:
     """Read `resolution`, `intrinsics`, `distortion_model` and `distortion_coefficients`.
 
-    Raises:
-        RecordingError: Names the file, the key and what would be right.
+    RecordingError names the file, the key and what would be right.
     """
     values = read_mapping(path)
     model = values.get("camera_model", "pinhole")

@@ -44,11 +44,7 @@ def parse_stamp(text: str) -> int:
 
 
 def read_tum(path: Path | str) -> Trajectory:
-    """Read poses `timestamp tx ty tz qx qy qz qw`.
-
-    Raises:
-        RecordingError: A line is no pose, not finite or out of order: names file and line.
-    """
+    """Read poses `timestamp tx ty tz qx qy qz qw`; RecordingError names file and line."""
     path = Path(path)
     stamps: list[int] = []
     poses: list[SE3] = []
@@ -94,50 +90,15 @@ def write_tum(path: Path | str, trajectory: Trajectory) -> None:
 
 
 def read_associations(path: Path) -> tuple[I64, list[str], list[str]]:
-    """Colour stamps (N,) [ns], colour files and depth files, relative to the list's folder.
-
-    Raises:
-        RecordingError: Names the file and the line or stamp that is wrong.
-    """
-    stamps, colour, depth = [], [], []
-    for number, line in _entries(path):
-        fields = line.split()
-        if len(fields) != 4:
-            raise RecordingError(
-                f"{path}:{number}: expected 'time colour-file time depth-file', got '{line[:60]}'"
-            )
-        try:
-            stamps.append(parse_stamp(fields[0]))
-        except ValueError as error:
-            raise RecordingError(f"{path}:{number}: {error}") from None
-        colour.append(fields[1])
-        depth.append(fields[3])
-    array = np.array(stamps, np.int64)
-    check_stamps(array, path)
-    return array, colour, depth
+    """Colour stamps (N,) [ns], colour files and depth files, relative to the list's folder."""
+    stamps, rows = _read_stamped(path, "time colour-file time depth-file")
+    return stamps, [row[1] for row in rows], [row[3] for row in rows]
 
 
 def read_image_list(path: Path) -> tuple[I64, list[str]]:
-    """Stamps (N,) [ns] and file names, relative to the list's folder, as in `rgb.txt`.
-
-    Raises:
-        RecordingError: Names the file and the line or stamp that is wrong.
-    """
-    stamps, names = [], []
-    for number, line in _entries(path):
-        fields = line.split()
-        if len(fields) != 2:
-            raise RecordingError(
-                f"{path}:{number}: expected 'timestamp filename', got '{line[:60]}'"
-            )
-        try:
-            stamps.append(parse_stamp(fields[0]))
-        except ValueError as error:
-            raise RecordingError(f"{path}:{number}: {error}") from None
-        names.append(fields[1])
-    array = np.array(stamps, np.int64)
-    check_stamps(array, path)
-    return array, names
+    """Stamps (N,) [ns] and file names, relative to the list's folder, as in `rgb.txt`."""
+    stamps, rows = _read_stamped(path, "timestamp filename")
+    return stamps, [row[1] for row in rows]
 
 
 def write_image_lists(folder: Path, stamps_ns: I64, names: list[str]) -> None:
@@ -155,6 +116,27 @@ def write_accelerometer(path: Path, samples: ImuSamples) -> None:
     rows = zip(samples.stamps_ns.tolist(), samples.accelerometer.tolist(), strict=True)
     lines = [f"{format_stamp(t)} {x:.6f} {y:.6f} {z:.6f}" for t, (x, y, z) in rows]
     path.write_text("\n".join(["# timestamp ax ay az", *lines]) + "\n", encoding="utf-8")
+
+
+def _read_stamped(path: Path, columns: str) -> tuple[I64, list[list[str]]]:
+    """Stamps (N,) [ns] and the fields of each line, as many as `columns` names.
+
+    Raises:
+        RecordingError: Names the file and the line or stamp that is wrong.
+    """
+    stamps, rows = [], []
+    for number, line in _entries(path):
+        fields = line.split()
+        if len(fields) != len(columns.split()):
+            raise RecordingError(f"{path}:{number}: expected '{columns}', got '{line[:60]}'")
+        try:
+            stamps.append(parse_stamp(fields[0]))
+        except ValueError as error:
+            raise RecordingError(f"{path}:{number}: {error}") from None
+        rows.append(fields)
+    array = np.array(stamps, np.int64)
+    check_stamps(array, path)
+    return array, rows
 
 
 def _entries(path: Path) -> list[tuple[int, str]]:

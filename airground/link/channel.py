@@ -84,5 +84,4 @@ class Receiver:
             self._socket.send(b"", zmq.NOBLOCK)
 
     def close(self) -> None:
-        """Close the socket."""
         self._socket.close()

@@ -31,12 +31,7 @@ Parts = list[bytes]
 
 
 def pack(frame: TrackedFrame, jpeg_quality: int | None = None) -> Parts:
-    """The message of a frame.
-
-    Args:
-        frame: Frame to send.
-        jpeg_quality: JPEG quality of the MAV's images, 1 to 100; None sends them uncompressed.
-    """
+    """The message of a frame; the MAV's image is a JPEG of that quality (1 to 100), if given."""
     pose, image = frame.pose, frame.image
     scale = None if pose.scale is None else (pose.scale.sigma, pose.scale.observable)
     header = {
@@ -64,11 +59,7 @@ def pack(frame: TrackedFrame, jpeg_quality: int | None = None) -> Parts:
 
 
 def unpack(parts: Sequence[bytes]) -> TrackedFrame:
-    """The frame of a message.
-
-    Raises:
-        InputError: The message is not a tracked frame.
-    """
+    """The frame of a message; InputError if it is none from `pack`."""
     try:
         header, arrays = _parse(parts)
         return _frame(header, arrays)

@@ -36,12 +36,7 @@ class HeadingEstimator:
         self._sums = np.zeros(BINS, np.complex128)
 
     def add(self, field_imu: F64, T_map_imu: SE3) -> None:
-        """Take in magnetic field samples.
-
-        Args:
-            field_imu: (N, 3) magnetic field in the IMU's frame [T]; NaN samples are left out.
-            T_map_imu: Pose of the IMU in the map at that time.
-        """
+        """Take in samples (N, 3) [T] in the IMU's frame, all at one pose; NaN are left out."""
         if self._place is None or _elsewhere(self._place, T_map_imu):
             self._place, self._samples_here = T_map_imu, 0
         field = np.asarray(field_imu, np.float64).reshape(-1, 3) @ T_map_imu.rotation.T

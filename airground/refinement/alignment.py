@@ -22,14 +22,7 @@ COVER_CELLS_PER_M = 25.0
 def refine(
     stamp_ns: int, T_ground_mav_start: SE3, aerial: PointCloud, ground: PointCloud, config: Config
 ) -> Alignment:
-    """Align an aerial cloud with the ground map.
-
-    Args:
-        stamp_ns: Stamp of the aerial surface [ns].
-        T_ground_mav_start: First guess.
-        aerial: Aerial cloud in the frame `mav`.
-        ground: Ground map in the frame `ground`.
-        config: Configuration; its section `refinement` is used.
+    """Align an aerial cloud in the frame `mav` with the ground map in the frame `ground`.
 
     Returns:
         The refined motion and whether it may be used. Clouds that are too small or do not

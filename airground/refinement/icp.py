@@ -19,13 +19,7 @@ SPARSE, SPARSE_ABOVE_M = 3, 0.1
 
 
 def point_to_plane_icp(source: F64, target: Surfels, start: SE3, config: Refinement) -> SE3:
-    """Move a cloud until the distances along the target's normals are least.
-
-    Args:
-        source: (N, 3) points to move [m].
-        target: Surfels to move the points onto.
-        start: First guess of T_target_source.
-        config: Section `refinement` of the configuration.
+    """Move points (N, 3) [m] until the distances along the target's normals are least.
 
     Returns:
         T_target_source; the last motion found where the correspondences do not suffice.

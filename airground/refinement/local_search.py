@@ -17,20 +17,14 @@ MIN_CELLS = 50
 
 
 def search_nearby(aerial: F64, ground: F32, start: SE3, config: Refinement) -> SE3 | None:
-    """The level motion around a start whose height maps agree best.
+    """The level motion T_ground_aerial around a start whose height maps agree best.
 
     Searches shifts within the configured radius and a few degrees of heading, turned about
     the middle of the aerial points; the height follows from the mean difference (Delta z
     of Sec. VI-A).
 
-    Args:
-        aerial: (N, 3) points of the aerial surface.
-        ground: (M, 3) points of the ground map.
-        start: First guess of T_ground_aerial; only its heading is kept of its rotation.
-        config: Radius and resolution.
-
     Returns:
-        T_ground_aerial, or None where the maps do not overlap.
+        The motion, of whose rotation only a heading is left; None where the maps do not overlap.
     """
     cells_per_m = config.local_search_cells_per_m
     ground_map = make_height_map(ground, cells_per_m)

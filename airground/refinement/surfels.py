@@ -39,12 +39,7 @@ class Surfels:
 
 
 def make_surfels(points: F32, voxel_m: float) -> Surfels:
-    """Average points over cubes and fit a plane to each one's neighbours.
-
-    Args:
-        points: (N, 3) points [m], at least one.
-        voxel_m: Side of the cubes [m].
-    """
+    """Average points (N >= 1, 3) [m] over cubes and fit a plane to each one's neighbours."""
     # One thread where the result would depend on how many there are.
     cloud = small_gicp.voxelgrid_sampling(np.asarray(points, np.float64), voxel_m, num_threads=1)
     tree = small_gicp.KdTree(cloud, num_threads=1)
