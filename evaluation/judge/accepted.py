@@ -13,24 +13,20 @@ from datetime import date
 from pathlib import Path
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from airground.errors import InputError
 from evaluation.judge.measured import Measured, headline
 from evaluation.judge.metrics import WATCHED
 from evaluation.judge.samples import DIGITS, Flight, Samples
-from evaluation.setup.checked_json import read_checked
+from evaluation.setup.checked_json import Part, read_checked
 from evaluation.setup.condition import Condition
 
 SCHEMA: Literal[1] = 1
 Text = Annotated[str, Field(min_length=1)]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
-
-
-class Acceptance(_Part):
+class Acceptance(Part):
     """One decision, with the reason why the figures moved.
 
     Attributes:
@@ -43,7 +39,7 @@ class Acceptance(_Part):
     headline: dict[str, float | None]
 
 
-class ConditionPart(_Part):
+class ConditionPart(Part):
     preset: str
     poses: str
     sensors: str
@@ -51,7 +47,7 @@ class ConditionPart(_Part):
     variant: str
 
 
-class MetricPart(_Part):
+class MetricPart(Part):
     """The values of one metric: one list per flight, in the order of `Accepted.flights`."""
 
     unit: str
@@ -59,7 +55,7 @@ class MetricPart(_Part):
     values: list[list[float | None] | None]
 
 
-class Accepted(_Part):
+class Accepted(Part):
     """Content of `accepted.json`; the newest acceptance is last in the history."""
 
     schema_: Literal[1] = Field(alias="schema")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, spearmanr
 
 from evaluation.judge import samples
-from evaluation.measure.protocol.negatives import CASES, Case
+from evaluation.measure.protocol.negatives import CASES
 from evaluation.setup.checked_json import Count, Number, Part, Share, number
 from evaluation.table.intervals import Rate, wilson
 from evaluation.table.rows import CONTROL_SCENES, SEQUENCE_KEYS, ResultTable
@@ -73,18 +73,14 @@ def _by_case(
     controls = [scene for scene in table.scenes() if scene in CONTROL_SCENES]
     places = table.of_scenes(scene for scene in table.scenes() if scene not in CONTROL_SCENES)
     flat = claimed(table.of_scenes(controls))
+    negatives = {case.stage: table.rows(case.stage, metric)["value"] for case in CASES}
     made = {
         TO_BE_FOUND: Claims.of(claimed(places), wrong(places)),
         NO_STRUCTURE: Claims.of(flat, flat),
-        **{case.stage: _negative(table, case, metric) for case in CASES},
+        **{stage: Claims.of(claims, claims) for stage, claims in negatives.items()},
     }
     asked = {name: claims for name, claims in made.items() if claims.accepted.total}
     return asked | {ALL: Claims.sum(list(asked.values()))} if asked else {}
-
-
-def _negative(table: ResultTable, case: Case, metric: str) -> Claims:
-    claimed = table.rows(case.stage, metric)["value"]
-    return Claims.of(claimed, claimed)
 
 
 METRIC = "squared_mahalanobis"
@@ -114,7 +110,6 @@ class Localizations:
         return len(self.accepted)
 
     def only_accepted(self) -> Localizations:
-        """Those that claim a position."""
         kept = self.accepted
         return Localizations(
             self.error_m[kept], self.spread_m[kept], self.squared_mahalanobis[kept], kept[kept]
@@ -154,12 +149,8 @@ def localizations(table: ResultTable) -> Localizations:
     ]
     wide = frame.pivot(index=keys, columns="metric", values="value").reindex(columns=metrics)
     believed = wide[wide[METRIC].notna()]
-    error_m, spread_m, distance, converged = (_column(believed, name) for name in metrics)
+    error_m, spread_m, distance, converged = believed.to_numpy(np.float64).T
     return Localizations(error_m, spread_m, distance, converged > 0)
-
-
-def _column(frame: pd.DataFrame, name: str) -> NDArray[np.float64]:
-    return frame[name].to_numpy(np.float64)
 
 
 class ShareOf(Part):
@@ -184,10 +175,6 @@ class ClaimsPart(Part):
 
     accepted: ShareOf
     wrong: ShareOf
-
-    @classmethod
-    def of(cls, claims: Claims) -> ClaimsPart:
-        return cls(accepted=ShareOf.of(claims.accepted), wrong=ShareOf.of(claims.wrong))
 
 
 class ClaimsSummary(Part):
@@ -233,7 +220,10 @@ def claims_summary(table: ResultTable) -> ClaimsSummary:
     """Of one condition, control scenes and negative cases included."""
 
     def parts(claims: dict[str, Claims]) -> dict[str, ClaimsPart]:
-        return {case: ClaimsPart.of(made) for case, made in claims.items()}
+        return {
+            case: ClaimsPart(accepted=ShareOf.of(made.accepted), wrong=ShareOf.of(made.wrong))
+            for case, made in claims.items()
+        }
 
     return ClaimsSummary(
         localization=parts(localization_claims(table)), refinement=parts(refinement_claims(table))

@@ -61,11 +61,9 @@ class LiveRobot(Part):
 
 
 class LiveSummary(Part):
-    """The live runs.
+    """The live runs, `runs` in number.
 
     Attributes:
-        runs: Number of runs.
-        mav, ground: The robots.
         aligned_ms: Time from a surface's last image to its place in the ground map.
         mapper_processor_share: Share of one core.
         peak_memory_mib: Memory of all processes together [MiB].

@@ -36,32 +36,27 @@ class Results:
 
 
 def read_results(folder: Path) -> Results:
-    """Read what `Results.write` wrote.
-
-    Raises:
-        InputError: A file is missing or damaged; names it.
-    """
-    if not folder.is_dir():
-        raise InputError(f"{folder}: no such folder; expected what run or reproduce wrote")
-    summary = Summary.read(folder / SUMMARY)
+    """Read the files of a run; raises InputError where one is missing or damaged."""
+    _check_folder(folder)
+    seed = Summary.read(folder / SUMMARY).seed
     showcase = folder / SHOWCASE
     return Results(
         table=ResultTable.read(folder / TABLE),
         config=resolve(file=folder / CONFIG),
-        seed=summary.seed,
+        seed=seed,
         showcase=Showcase.load(showcase) if showcase.is_dir() else None,
     )
 
 
 def read_table(folder: Path) -> ResultTable:
-    """Read only the measurements of what `Results.write` wrote.
+    """Read only the measurements of a run; errors as of `read_results`."""
+    _check_folder(folder)
+    return ResultTable.read(folder / TABLE)
 
-    Raises:
-        InputError: The folder or its table is missing or damaged; names it.
-    """
+
+def _check_folder(folder: Path) -> None:
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder; expected what run or reproduce wrote")
-    return ResultTable.read(folder / TABLE)
 
 
 def merged(parts: Sequence[Results]) -> Results:

@@ -22,15 +22,7 @@ MOST_RUNS = 4
 
 @dataclass(frozen=True)
 class Run:
-    """What one run left, of its primary condition.
-
-    Attributes:
-        name: Its name for readers.
-        table: Its rows, control scenes included.
-        config: Its parameters, as resolved.
-        summary: Its summary, with the origin of the run.
-        measured: Its watched metrics.
-    """
+    """What one run left, of its primary condition; `table` includes control scenes."""
 
     name: str
     table: ResultTable
@@ -104,11 +96,8 @@ class Against:
 
     def outcome(self) -> str:
         """Number of metrics with each verdict of a change, in a few words."""
-        counts = [
-            f"{len(self.comparison.of(verdict))} {verdict}"
-            for verdict in MOVED
-            if self.comparison.of(verdict)
-        ]
+        found = {verdict: len(self.comparison.of(verdict)) for verdict in MOVED}
+        counts = [f"{count} {verdict}" for verdict, count in found.items() if count]
         if not counts and not self.comparison.of(Verdict.SAME):
             return "no verdict possible"
         return ", ".join(counts) or str(Verdict.SAME)

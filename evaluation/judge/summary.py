@@ -191,12 +191,9 @@ def _slam(table: ResultTable, condition: Condition) -> Slam:
 
 
 def _surface(table: ResultTable) -> Surface:
-    names = {
-        "error_median_m": "surface_median",
-        "error_p90_m": "surface_p90",
-        "completeness": "completeness",
-    }
-    return Surface(**{key: number(median(METRICS[name], table)) for key, name in names.items()})
+    names = ("surface_median", "surface_p90", "completeness")
+    middle, p90, completeness = (number(median(METRICS[name], table)) for name in names)
+    return Surface(error_median_m=middle, error_p90_m=p90, completeness=completeness)
 
 
 def _localization(table: ResultTable) -> Localization:

@@ -155,7 +155,10 @@ def _compared(metric: Metric, before: Samples, after: Samples, paired: bool) -> 
         differences, by_flight = paired_differences(metric, before, after)
         effect = paired_effect(differences, metric.share)
         return Compared(effect, len(differences), by_flight)
-    return _compared_samples(metric, before, after)
+    by_flight = _reaches(least_two_sample_p(len(before), len(after)))
+    old, new = (_observations(metric, side, by_flight) for side in (before, after))
+    effect = two_sample_effect(old, new, metric.share)
+    return Compared(effect, min(len(old), len(new)), by_flight)
 
 
 def paired_differences(
@@ -179,13 +182,6 @@ def paired_differences(
         middle = [float(d.mean()) if metric.share else median(d) for d in flights]
         return np.array(middle), True
     return np.concatenate(flights), False
-
-
-def _compared_samples(metric: Metric, before: Samples, after: Samples) -> Compared:
-    by_flight = _reaches(least_two_sample_p(len(before), len(after)))
-    old, new = (_observations(metric, side, by_flight) for side in (before, after))
-    effect = two_sample_effect(old, new, metric.share)
-    return Compared(effect, min(len(old), len(new)), by_flight)
 
 
 def _observations(metric: Metric, samples: Samples, by_flight: bool) -> NDArray[np.float64]:

@@ -14,12 +14,7 @@ Model = TypeVar("Model", bound=BaseModel)
 
 
 def read_checked(model: type[Model], path: Path, kind: str) -> Model:
-    """Read a file and check it against what it must hold.
-
-    Args:
-        model: The form that it must have.
-        path: Where it is.
-        kind: What it ought to be, in words: "summary".
+    """Read a file and check it against a model; errors call it by its `kind`, as "summary".
 
     Raises:
         InputError: The file is missing, no JSON, or not of that form: one line that names the

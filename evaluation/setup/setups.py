@@ -130,12 +130,9 @@ def with_localization(config: Config, **changes: object) -> Config:
 
 
 def with_companions(primary: Setup, few: bool = False) -> list[Setup]:
-    """The primary setup first, then what the report shows beside it.
+    """The primary setup, then what the report shows beside it.
 
-    Args:
-        primary: What the user asked for.
-        few: Only the true poses beside it, and the paper's constants with both readings of
-            its sigma.
+    `few` leaves only the true poses, and the paper's constants with both readings of its sigma.
     """
     best, published = Config(), paper()
     minmax = with_localization(published, sigma_units="minmax")

@@ -39,9 +39,6 @@ class AnswerLog(Sequence[TrackedPose]):
     """Answers in order of time, without their corners; each is made anew when it is asked for.
 
     As objects they take 3.3 kB each, or 120 MB in ten minutes of two robots.
-
-    Args:
-        answers: The first ones.
     """
 
     def __init__(self, answers: Iterable[TrackedPose] = ()) -> None:

@@ -43,11 +43,8 @@ def true_camera(recording: RobotRecording) -> Callable[[int], SE3 | None] | None
             if not (recording.path / "truth").is_dir():
                 return None
             truth = Truth.open(recording.path)
-            return (
-                truth.T_world_mav_camera
-                if recording.robot == Source.MAV
-                else truth.T_world_ground_camera
-            )
+            is_mav = recording.robot == Source.MAV
+            return truth.T_world_mav_camera if is_mav else truth.T_world_ground_camera
         case "tum":
             file = recording.path / "groundtruth.txt"
             return _lookup(read_tum(file), SE3.identity()) if file.exists() else None

@@ -131,11 +131,5 @@ def surface_error(
 def depth_error(
     depth: NDArray[np.float32], camera: PinholeCamera, stamp_ns: int, truth: Truth
 ) -> NDArray[np.float32]:
-    """(height, width) depth minus true depth [m] of a view of the MAV, NaN where one is missing.
-
-    Args:
-        depth, camera: As in `surface_error`.
-        stamp_ns: When the view was taken.
-        truth: The scene, and where the camera truly was.
-    """
+    """(height, width) depth minus true depth [m] of the MAV's view, NaN where one is missing."""
     return (depth - truth.cast(camera, truth.T_world_mav_camera(stamp_ns))).astype(np.float32)

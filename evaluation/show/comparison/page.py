@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from evaluation.judge.runs import Against, Run
 from evaluation.judge.samples import Flight
@@ -19,52 +18,37 @@ from evaluation.show.report.page import rendered, saved_picture
 PAGE = "compare.html"
 
 
-@dataclass(frozen=True)
-class Section:
-    """What the page states of one run, beside the figures."""
-
-    name: str
-    outcome: str
-    conclusion: str
-    judged: str
-    caveats: list[str]
-    moved: TextTable
-    rest: TextTable
-    failures: FailuresMoved | None
-
-    @classmethod
-    def of(cls, held: Against) -> Section:
-        return cls(
-            name=held.run.name,
-            outcome=held.outcome(),
-            conclusion=conclusion(held.comparison),
-            judged=conditions(held.comparison),
-            caveats=held.caveats(),
-            moved=moved_table(held),
-            rest=rest_table(held),
-            failures=failures_moved(held) if held.shared else None,
-        )
-
-
 def write_comparison(out: Path, helds: Sequence[Against]) -> None:
     """Write the page and `figures/` (PNG and PDF) into an existing folder.
 
-    Args:
-        out: Where.
-        helds: At least one; all have the same reference.
+    All of `helds`, one at least, have the same reference.
     """
     reference = helds[0].reference
     runs = [reference, *(held.run for held in helds)]
     page = rendered(
         "compare.html.j2",
         reference=reference.name,
-        sections=[Section.of(held) for held in helds],
+        sections=[_section(held) for held in helds],
         overview=overview_table(helds) if len(helds) > 1 else None,
         pictures=[saved_picture(drawn, out) for drawn in comparison_figures(helds)],
         differing=conditions_table(runs, common=False),
         common=conditions_table(runs, common=True),
     )
     (out / PAGE).write_text(page, encoding="utf-8")
+
+
+def _section(held: Against) -> dict[str, object]:
+    """What the page states of one run, beside the figures."""
+    return {
+        "name": held.run.name,
+        "outcome": held.outcome(),
+        "conclusion": conclusion(held.comparison),
+        "judged": conditions(held.comparison),
+        "caveats": held.caveats(),
+        "moved": moved_table(held),
+        "rest": rest_table(held),
+        "failures": failures_moved(held) if held.shared else None,
+    }
 
 
 def moved_table(held: Against) -> TextTable:
@@ -155,12 +139,12 @@ def _conditions(run: Run) -> dict[str, str]:
 
 def _parameters(run: Run) -> dict[str, str]:
     """Every parameter by its name in --set."""
-    made = {}
-    for section, values in run.config.model_dump().items():
-        entries: dict[str, Any] = values if isinstance(values, dict) else {}
-        for key, value in entries.items():
-            made[f"{section}.{key}"] = str(value)
-    return made
+    return {
+        f"{section}.{key}": str(value)
+        for section, values in run.config.model_dump().items()
+        if isinstance(values, dict)
+        for key, value in values.items()
+    }
 
 
 def _seeds(flights: Sequence[Flight]) -> str:

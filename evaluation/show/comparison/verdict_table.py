@@ -77,11 +77,11 @@ def print_comparison(comparison: Comparison, console: Console | None = None) -> 
     """The table on the screen."""
     console = console or Console()
     kept = [n for n, name in enumerate(HEADER) if console.width >= WIDE or name in NARROW]
-    rows = [cells(judged) for judged in comparison.judged]
+    header, *rows = (
+        tuple(row[n] for n in kept) for row in (HEADER, *map(cells, comparison.judged))
+    )
     print_table(
-        TextTable(
-            tuple(HEADER[n] for n in kept), tuple(tuple(row[n] for n in kept) for row in rows)
-        ),
+        TextTable(header, tuple(rows)),
         conclusion(comparison),
         conditions(comparison),
         console=console,

@@ -41,16 +41,8 @@ def claims_table(table: ResultTable) -> TextTable:
         for case, title in TITLES.items()
         if case in located or case in refined
     ]
-    header = (
-        "case",
-        "localizations",
-        "claim a position",
-        "wrong claims",
-        "refinements",
-        "accepted",
-        "wrongly",
-    )
-    return TextTable(header, tuple(rows))
+    localizations_of = ("localizations", "claim a position", "wrong claims")
+    return TextTable(("case", *localizations_of, "refinements", "accepted", "wrongly"), tuple(rows))
 
 
 def _cells(claims: Claims | None) -> tuple[str, str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -16,17 +17,13 @@ from evaluation.table.intervals import quantile, wilson
 from evaluation.table.limits import GOOD_POSE, is_good_pose
 from evaluation.table.rows import ResultTable
 
+Errors = dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]
+"""What is true -> (N,) errors of position [m] and of angle [deg], NaN where no pose was found."""
+
 
 @styled
-def error_budget_figure(
-    errors: dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]],
-) -> Figure:
-    """Median as a bar, quartiles as a whisker; the first row's median runs through all.
-
-    Args:
-        errors: What is true -> (N,) errors of position [m] and (N,) of angle [deg], NaN where
-            the pose was not found.
-    """
+def error_budget_figure(errors: Errors) -> Figure:
+    """Median as a bar, quartiles as a whisker; the first row's median runs through all."""
     figure = Figure(figsize=(WIDE_IN, 0.28 * len(errors) + 1.2), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     _bars(left, [1e3 * metres for metres, _ in errors.values()], "position error [mm]")
@@ -87,15 +84,11 @@ def budget_table(table: ResultTable) -> TextTable:
     return TextTable(header, tuple(rows))
 
 
-def _errors(
-    table: ResultTable,
-) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+def _errors(table: ResultTable) -> Errors:
     """Errors by stand-in, in the order measured."""
-    made = {}
-    for name in table.rows("budget", "translation_m")["note"].unique():
-        columns = []
-        for metric in ("translation_m", "rotation_deg"):
-            rows = table.rows("budget", metric)
-            columns.append(rows[rows["note"] == name]["value"].to_numpy(np.float64))
-        made[str(name)] = (columns[0], columns[1])
-    return made
+    off_m, off_deg = (table.rows("budget", what) for what in ("translation_m", "rotation_deg"))
+
+    def of(name: str, rows: pd.DataFrame) -> NDArray[np.float64]:
+        return rows[rows["note"] == name]["value"].to_numpy(np.float64)
+
+    return {str(name): (of(name, off_m), of(name, off_deg)) for name in off_m["note"].unique()}

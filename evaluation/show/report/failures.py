@@ -19,17 +19,14 @@ class Failure:
 
     Attributes:
         kind: "sequence" or "refinement".
-        scene, seed, flight, number: Which one.
+        place: Scene, seed, flight, and number of the sequence or trial.
         result: How it ended.
         said: What the pipeline reported: a claim, or the reason of a refusal.
         story: The errors step by step.
     """
 
     kind: str
-    scene: str
-    seed: int
-    flight: int
-    number: int
+    place: tuple[str, int, int, int]
     result: str
     said: str
     story: TextTable
@@ -37,12 +34,12 @@ class Failure:
     @property
     def key(self) -> tuple[str, str, int, int, int]:
         """What names the same trial in another run."""
-        return self.kind, self.scene, self.seed, self.flight, self.number
+        return self.kind, *self.place
 
     @property
     def title(self) -> str:
-        where = f"{self.scene}, seed {self.seed}, flight {self.flight}"
-        return f"{self.kind} {self.number} of {where}"
+        scene, seed, flight, number = self.place
+        return f"{self.kind} {number} of {scene}, seed {seed}, flight {flight}"
 
 
 def control_table(table: ResultTable, conditions: Sequence[Condition]) -> TextTable:
@@ -57,14 +54,8 @@ def control_table(table: ResultTable, conditions: Sequence[Condition]) -> TextTa
         notes = part.rows("localization", "converged")["note"]
         said = notes[notes != ""].value_counts()
         reason = f"{said.index[0]} ({said.iloc[0]} of {len(notes)} updates)" if len(said) else ""
-        rows.append(
-            (
-                ", ".join(part.scenes()),
-                condition.label(),
-                f"{int(ever.sum())} of {len(ever)}",
-                reason or MISSING,
-            )
-        )
+        claims = f"{int(ever.sum())} of {len(ever)}"
+        rows.append((", ".join(part.scenes()), condition.label(), claims, reason or MISSING))
     header = ("scene", "condition", "ever claimed a position", "why not, mostly")
     return TextTable(header, tuple(rows))
 
@@ -80,12 +71,8 @@ def _failed_sequences(table: ResultTable) -> Iterator[Failure]:
         return
     judged = min(FOURTH_MAP, errors.shape[1])
     notes = table.rows("localization", "converged").set_index([*SEQUENCE_KEYS, "iteration"])["note"]
-    for key, error, spread in zip(
-        errors.index.to_list(),
-        errors.to_numpy(np.float64),
-        spreads.to_numpy(np.float64),
-        strict=True,
-    ):
+    each = (frame.to_numpy(np.float64) for frame in (errors, spreads))
+    for key, error, spread in zip(errors.index.to_list(), *each, strict=True):
         if error[judged - 1] <= LOCATED_M:
             continue
         said = [
@@ -101,10 +88,7 @@ def _failed_sequences(table: ResultTable) -> Iterator[Failure]:
         scene, seed, flight, sequence = key
         yield Failure(
             "sequence",
-            str(scene),
-            int(seed),
-            int(flight),
-            int(sequence),
+            (str(scene), int(seed), int(flight), int(sequence)),
             result,
             said[judged - 1],
             TextTable(("aerial map", "error", "spread", "result"), steps),
@@ -130,10 +114,7 @@ def _failed_trials(table: ResultTable) -> Iterator[Failure]:
         )
         yield Failure(
             "refinement",
-            str(scene),
-            int(seed),
-            int(flight),
-            int(number),
+            (str(scene), int(seed), int(flight), int(number)),
             f"{_off(off_m)}, {degrees(off_deg)}",
             "accepted" if accepted else f"refused: {notes.get((scene, seed, flight, number), '')}",
             TextTable(("when", "position error", "angle error"), steps),

@@ -161,11 +161,9 @@ def _refined(drawn: Drawn) -> pd.Series:
 
 
 def _timing(primary: Drawn) -> Iterator[ReportFigure]:
-    durations = {
-        stage.metric: primary.table.values("timing", stage.metric)
-        for stage in published.TABLE_I
-        if len(primary.table.values("timing", stage.metric))
-    }
+    stages = [stage.metric for stage in published.TABLE_I]
+    durations = {stage: primary.table.values("timing", stage) for stage in stages}
+    durations = {stage: values for stage, values in durations.items() if len(values)}
     if durations:
         yield ReportFigure(
             "table1_timing",
@@ -179,9 +177,9 @@ def _timing(primary: Drawn) -> Iterator[ReportFigure]:
 def _counts(drawn: list[Drawn], counts: list[int], what: str) -> str:
     """Number of cases under each condition."""
     if len(set(counts)) == 1:
-        each = " each" if len(counts) > 1 else ""
-        return f"Here: {counts[0]} {what}{each}; {_shared([d.condition for d in drawn])}."
-    listed = "; ".join(f"{n} {what} ({d.label})" for d, n in zip(drawn, counts, strict=True))
+        listed = f"{counts[0]} {what}" + (" each" if len(counts) > 1 else "")
+    else:
+        listed = "; ".join(f"{n} {what} ({d.label})" for d, n in zip(drawn, counts, strict=True))
     return f"Here: {listed}; {_shared([d.condition for d in drawn])}."
 
 

@@ -58,7 +58,7 @@ def write_report(
 
     Args:
         out: Folder of the run; made where missing.
-        table: Everything that was measured.
+        table: Everything that was measured; its first condition is the primary one.
         showcase: What the pictures are drawn from; None leaves them out.
         run: Where the results come from.
         notes: Sentences that the page lists at its end.

@@ -105,21 +105,13 @@ def timing_table(table: ResultTable) -> TextTable:
         here = stage_timing(table, stage.metric)
         if here.n == 0 and stage.published_ms is None:
             continue
-        paper = MISSING
-        if stage.published_ms is not None:
-            paper = f"{stage.published_ms:g} ({stage.processor})"
+        published_ms = stage.published_ms
+        paper = MISSING if published_ms is None else f"{published_ms:g} ({stage.processor})"
         mean = milliseconds(here.mean) if here.n else "not run"
         times = (mean, milliseconds(here.median), milliseconds(here.p95))
         rows.append((f"{stage.group}: {stage.title}", paper, *times, str(here.n)))
-    header = (
-        "stage",
-        "paper, average [ms]",
-        "here, average [ms]",
-        "here, median [ms]",
-        "here, 95 % [ms]",
-        "n",
-    )
-    return TextTable(header, tuple(rows))
+    here_ms = (f"here, {what} [ms]" for what in ("average", "median", "95 %"))
+    return TextTable(("stage", "paper, average [ms]", *here_ms, "n"), tuple(rows))
 
 
 SCENE_METRICS = (
@@ -206,20 +198,11 @@ def _live_delay(table: ResultTable) -> str:
 
 _COMPARED_ROWS: tuple[tuple[str, str, Cell], ...] = (
     ("sequences", SEQUENCES, lambda t: _count(len(t.sequences("error_m")))),
-    _row("within_50cm_1"),
-    _row("within_25cm_4"),
-    _row("posed_4"),
-    _row("localization_4"),
-    _row("localization_12"),
-    _row("aligned_translation"),
-    _row("aligned_well"),
+    *map(_row, ("within_50cm_1", "within_25cm_4", "posed_4", "localization_4")),
+    *map(_row, ("localization_12", "aligned_translation", "aligned_well")),
     ("localizations that claim a position", MISSING, _claims(wrong=False)),
     (f"claims that are off by more than {LOCATED_M:g} m", MISSING, _claims(wrong=True)),
-    (
-        "refinement trials",
-        TRIALS,
-        lambda t: _count(len(t.trials())),
-    ),
+    ("refinement trials", TRIALS, lambda t: _count(len(t.trials()))),
     ("start of refinement, median", MISSING, _trial_errors("before")),
     (
         "refined, median",
@@ -227,9 +210,7 @@ _COMPARED_ROWS: tuple[tuple[str, str, Cell], ...] = (
         _trial_errors("after"),
     ),
     ("the same started at the truth (bound)", MISSING, _trial_errors("from_truth")),
-    _row("refined_well"),
-    _row("mav_trajectory"),
-    _row("ground_trajectory"),
+    *map(_row, ("refined_well", "mav_trajectory", "ground_trajectory")),
     ("surface, median error", MISSING, _surface),
     _row("completeness"),
     ("live: sent by the MAV", MISSING, _live_rate),

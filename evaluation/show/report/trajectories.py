@@ -81,12 +81,8 @@ def _median_and_worst(table: ResultTable, robot: str) -> list[ErrorOverTime]:
     ranked = frame.assign(value=with_failures(frame["value"])).sort_values("value", kind="stable")
     keys = [tuple(row) for row in ranked[RUN_KEYS].itertuples(index=False)]
     median, worst = keys[(len(keys) - 1) // 2], keys[-1]
-    if len(keys) == 1:
-        return [_over_time(table, robot, median, "the run")]
-    return [
-        _over_time(table, robot, median, "median run"),
-        _over_time(table, robot, worst, "worst run"),
-    ]
+    runs = {"the run": worst} if len(keys) == 1 else {"median run": median, "worst run": worst}
+    return [_over_time(table, robot, key, title) for title, key in runs.items()]
 
 
 def _over_time(table: ResultTable, robot: str, key: tuple, title: str) -> ErrorOverTime:

@@ -10,11 +10,10 @@ from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.slam.front_end import ScaleEstimate, TrackedPose, Tracking
 from evaluation.setup.condition import Condition
-from evaluation.table.consistency import consistency, level_alignment
 from evaluation.table.row_writer import RowWriter
 from evaluation.table.rows import ResultTable
 from evaluation.table.tracking_log import Tracked, WatchedFrontEnd
-from evaluation.table.tracking_quality import add_tracking
+from evaluation.table.tracking_quality import add_tracking, consistency, level_alignment
 
 STEP_NS = 50_000_000
 SIGMA_M, SIGMA_RAD = 0.01, 0.002
