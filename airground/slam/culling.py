@@ -19,7 +19,7 @@ from airground.core.se3 import SE3
 from airground.slam.map_adjustment import MapAdjuster
 from airground.slam.reacquisition import BORDER_PX, MAX_TURN_DEG, MAX_ZOOM
 from airground.slam.recovery import Recovery
-from airground.slam.sparse_map import SparseMap
+from airground.slam.sparse_map import SparseMap, camera_poses
 from airground.slam.tracked_path import TrackedPath
 
 COVERED_SHARE = 0.9
@@ -88,10 +88,7 @@ class KeyframeCuller:
             return True
         points = self.map.positions[ids]
         outside = self.map.keyframes[: -self.parameters.window - 1]
-        turned = np.array([other.state.rotation for other in outside])
-        centres = np.array([other.state.position for other in outside])
-        centres += turned @ self.T_rig_camera.translation
-        rotations = turned @ self.T_rig_camera.rotation
+        rotations, centres = camera_poses(outside, self.T_rig_camera)
         alike = self._alike(rotations, centres, keyframe, points.mean(axis=0))
         alike[keyframe] = False
         views = self._views(rotations[alike], centres[alike], points)

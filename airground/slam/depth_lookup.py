@@ -15,16 +15,18 @@ MAX_SPREAD = 0.05
 and depth are not taken at the same moment: the depth may belong to either side."""
 
 
-def inverse_depths_at(depth: F32, pixels: Floats, max_depth_m: float) -> F64:
+def inverse_depths_at(depth: F32 | None, pixels: Floats, max_depth_m: float) -> F64:
     """(N,) inverse depth [1/m] at (N, 2) pixels; NaN where none can be trusted.
 
     Args:
-        depth: (height, width) depth [m], NaN where missing.
+        depth: (height, width) depth [m], NaN where missing; None without a depth camera.
         pixels: (N, 2) pixels (x, y) of the corners.
         max_depth_m: Largest depth to use [m].
     """
-    inverse = np.empty(len(pixels))
-    _look_up(np.asarray(depth, np.float32), np.asarray(pixels, np.float64), max_depth_m, inverse)
+    inverse = np.full(len(pixels), np.nan)
+    if depth is not None:
+        depth, pixels = np.asarray(depth, np.float32), np.asarray(pixels, np.float64)
+        _look_up(depth, pixels, max_depth_m, inverse)
     return inverse
 
 

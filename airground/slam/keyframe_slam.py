@@ -28,7 +28,7 @@ from airground.slam.image_turn import ImageTurn
 from airground.slam.inertial.alignment import InertialAlignment
 from airground.slam.inertial.stationarity import Rest
 from airground.slam.keyframe_choice import KeyframeChoice
-from airground.slam.local_mapping import LocalMapper, NewKeyframe
+from airground.slam.local_mapping import LocalMapper
 from airground.slam.loop_closure import LoopCloser
 from airground.slam.map_adjustment import MapAdjuster
 from airground.slam.motion_model import MotionModel, Prediction
@@ -247,9 +247,6 @@ class KeyframeSlam:
         rows = np.flatnonzero(self.map.mapped(self.tracker.ids))
         ids = self.tracker.ids[rows]
         pixels = self.tracker.pixels[rows].astype(np.float64)
-        depths = None
-        if frame.depth is not None:
-            depths = inverse_depths_at(frame.depth, pixels, self._max_depth_m)
         expected = prediction.state.pose() @ self.T_rig_camera
         fit = frame_pose(
             self.map.positions[ids],
@@ -261,7 +258,7 @@ class KeyframeSlam:
             inertial=prediction.inertial,
             min_points=self.parameters.min_points,
             rng=self._rng,
-            inverse_depths=depths,
+            inverse_depths=inverse_depths_at(frame.depth, pixels, self._max_depth_m),
             inverse_depth_sigma=self._inverse_depth_sigma,
         )
         if fit is None or (self.metric and jumps(fit.T_map_camera, expected)):
@@ -325,8 +322,7 @@ class KeyframeSlam:
                 self.map.keyframes[-1].stamp_ns, frame.stamp_ns, self.state
             )
         self._torn = False
-        new = NewKeyframe(frame.stamp_ns, frame.image, frame.depth, self.state, motion, still)
-        covariance = self._mapper.insert(new, self.inertial)
+        covariance = self._mapper.insert(frame, self.state, motion, self.inertial, still)
         if covariance is not None:
             self._keyframe_covariance = covariance
         adjusted = self.map.keyframes[-1].state

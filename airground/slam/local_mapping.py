@@ -7,19 +7,20 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from airground.config import KeyframeSlam
-from airground.core.arrays import F32, F64, I64, U8, Mask
+from airground.core.arrays import F32, F64, I64
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam.corners import detect_corners
 from airground.slam.depth_lookup import inverse_depths_at
 from airground.slam.feature_tracker import FeatureTracker
+from airground.slam.frame import Frame
 from airground.slam.geometry.pose_estimation import estimate_pose
 from airground.slam.geometry.triangulation import triangulate_pairs
 from airground.slam.inertial.preintegration import Preintegration
 from airground.slam.map_adjustment import MapAdjuster
 from airground.slam.reacquisition import find_in_keyframes, keyframes_in_view, visible
 from airground.slam.rig_state import RigState
-from airground.slam.sparse_map import CANDIDATE, Keyframe, SparseMap
+from airground.slam.sparse_map import CANDIDATE, DROPPED, Keyframe, SparseMap, camera_poses
 
 MAX_TRIANGULATION_ERROR_PX = 2.0
 MIN_REUSED = 12
@@ -28,27 +29,6 @@ CROWDED = 0.5
 """Corners closer than this share of their spacing when chosen are too many."""
 REUSE_SEARCH_PX = 15.0
 """An old point farther than this from where it was expected is another."""
-
-
-@dataclass(frozen=True, eq=False)
-class NewKeyframe:
-    """An image that becomes a keyframe.
-
-    Attributes:
-        stamp_ns: Stamp of the image [ns].
-        image: (height, width) grey image.
-        depth: (height, width) depth [m]; None without a depth camera.
-        state: Tracked state of the rig.
-        motion: Inertial motion since the last keyframe, where known.
-        still: Whether the robot is at rest.
-    """
-
-    stamp_ns: int
-    image: U8
-    depth: F32 | None
-    state: RigState
-    motion: Preintegration | None
-    still: bool = False
 
 
 @dataclass(eq=False)
@@ -74,48 +54,37 @@ class LocalMapper:
     max_depth_m: float = np.inf
     found_old: bool = field(default=False, init=False)
 
-    def insert(self, new: NewKeyframe, inertial: bool) -> F64 | None:
+    def insert(
+        self,
+        frame: Frame,
+        state: RigState,
+        motion: Preintegration | None,
+        inertial: bool,
+        still: bool = False,
+    ) -> F64 | None:
         """Add a keyframe; returns the covariance of its pose where it is known.
 
         Args:
-            new: The keyframe, whose image is the tracker's newest.
+            frame: The tracker's newest image.
+            state: Tracked state of the rig at that image.
+            motion: Inertial motion since the last keyframe; None where it is not known.
             inertial: Whether the map is metric and gravity-aligned.
+            still: Whether the robot is at rest.
         """
-        keyframe = self._append(new)
-        index = len(self.map.keyframes) - 1
-        if new.motion is not None:
-            self.adjuster.motions[index] = new.motion
-        self._triangulate(keyframe)
-        self.found_old = self._reuse(keyframe, new)
-        covariance = self.adjuster.adjust_window(inertial)
-        self.tracker.keep(~self._dropped(self.tracker.ids))
-        self.tracker.thin(CROWDED * self.parameters.corner_spacing_px)
-        self._detect(keyframe, index, new)
-        return covariance
-
-    def _append(self, new: NewKeyframe) -> Keyframe:
-        pixels = self.tracker.pixels.astype(np.float64)
-        keyframe = Keyframe(
-            new.stamp_ns,
-            new.image,
-            new.state,
-            self.tracker.ids.copy(),
-            pixels,
-            self._inverse_depths(new, pixels),
-            new.still,
-        )
+        ids, pixels = self.tracker.ids.copy(), self.tracker.pixels.astype(np.float64)
+        depths = inverse_depths_at(frame.depth, pixels, self.max_depth_m)
+        keyframe = Keyframe(frame.stamp_ns, frame.image, state, ids, pixels, depths, still)
         self.map.keyframes.append(keyframe)
-        return keyframe
-
-    def _inverse_depths(self, new: NewKeyframe, pixels: F64) -> F64:
-        if new.depth is None:
-            return np.full(len(pixels), np.nan)
-        return inverse_depths_at(new.depth, pixels, self.max_depth_m)
-
-    def _dropped(self, ids: I64) -> Mask:
-        states = self.map.states[ids]
-        result: Mask = (states != CANDIDATE) & ~self.map.mapped(ids)
-        return result
+        index = len(self.map.keyframes) - 1
+        if motion is not None:
+            self.adjuster.motions[index] = motion
+        self._triangulate(keyframe)
+        self.found_old = self._reuse(keyframe, frame.depth)
+        covariance = self.adjuster.adjust_window(inertial)
+        self.tracker.keep(self.map.states[self.tracker.ids] != DROPPED)
+        self.tracker.thin(CROWDED * self.parameters.corner_spacing_px)
+        self._detect(keyframe, index, frame.depth)
+        return covariance
 
     def _triangulate(self, keyframe: Keyframe) -> None:
         """Place candidates whose rays from first sight and from here cross well."""
@@ -125,9 +94,9 @@ class LocalMapper:
         ids = keyframe.ids[rows]
         origins = [self.map.keyframes[k] for k in self.map.origins[ids]]
         points = triangulate_pairs(
-            self._cameras(origins),
+            camera_poses(origins, self.T_rig_camera),
             self.map.first_pixels[ids],
-            self._cameras([keyframe] * len(ids)),
+            camera_poses([keyframe] * len(ids), self.T_rig_camera),
             keyframe.pixels[rows],
             self.camera,
         )
@@ -135,14 +104,7 @@ class LocalMapper:
         good &= points.reprojection_px < MAX_TRIANGULATION_ERROR_PX
         self.map.place(ids[good], points.points[good])
 
-    def _cameras(self, keyframes: list[Keyframe]) -> tuple[F64, F64]:
-        """(n, 3, 3) and (n, 3) `T_map_camera` of keyframes."""
-        T = self.T_rig_camera
-        rotations = np.array([k.state.rotation for k in keyframes])
-        positions = np.array([k.state.position for k in keyframes])
-        return rotations @ T.rotation, rotations @ T.translation + positions
-
-    def _reuse(self, keyframe: Keyframe, new: NewKeyframe) -> bool:
+    def _reuse(self, keyframe: Keyframe, depth: F32 | None) -> bool:
         """Look for points of old keyframes: this is what closes loops before they open.
 
         Returns whether there were any.
@@ -150,7 +112,7 @@ class LocalMapper:
         old = len(self.map.keyframes) - 1 - self.parameters.window
         if old <= 0 or self.parameters.reused_keyframes == 0:
             return False
-        T_map_camera = new.state.pose() @ self.T_rig_camera
+        T_map_camera = keyframe.state.pose() @ self.T_rig_camera
         ids = np.setdiff1d(self.map.begun_before(old), self.tracker.ids, assume_unique=True)
         expected, inside = visible(self.map.positions[ids], T_map_camera, self.camera)
         ids, expected = ids[inside], expected[inside]
@@ -167,15 +129,15 @@ class LocalMapper:
             self.map,
             chosen,
             ids,
-            new.image,
+            keyframe.image,
             expected,
             self.parameters.patch_px,
             levels=1,
             search_px=REUSE_SEARCH_PX,
         )
-        return self._take_back(keyframe, new, found, pixels)
+        return self._take_back(keyframe, depth, found, pixels)
 
-    def _take_back(self, keyframe: Keyframe, new: NewKeyframe, ids: I64, pixels: F32) -> bool:
+    def _take_back(self, keyframe: Keyframe, depth: F32 | None, ids: I64, pixels: F32) -> bool:
         """Follow old points again if they agree with each other on where the camera is."""
         if len(ids) < MIN_REUSED:
             return False
@@ -184,7 +146,7 @@ class LocalMapper:
             pixels.astype(np.float64),
             np.full(len(ids), self.parameters.corner_sigma_px),
             self.camera,
-            new.state.pose() @ self.T_rig_camera,
+            keyframe.state.pose() @ self.T_rig_camera,
             rotation_sigma=0.01,
             position_sigma=0.1,
         )
@@ -193,22 +155,23 @@ class LocalMapper:
             return False
         self.tracker.add(ids[good], pixels[good])
         pixels_kept = pixels[good].astype(np.float64)
-        keyframe.see(ids[good], pixels_kept, self._inverse_depths(new, pixels_kept))
+        depths = inverse_depths_at(depth, pixels_kept, self.max_depth_m)
+        keyframe.see(ids[good], pixels_kept, depths)
         return True
 
-    def _detect(self, keyframe: Keyframe, index: int, new: NewKeyframe) -> None:
+    def _detect(self, keyframe: Keyframe, index: int, depth: F32 | None) -> None:
         """Follow new corners where there are none; with depth they are in the map at once."""
         wanted = self.parameters.corners - len(self.tracker.ids)
         corners = detect_corners(
-            new.image,
+            keyframe.image,
             self.tracker.pixels,
             wanted,
             self.parameters.corner_spacing_px,
-            None if new.depth is None else new.depth <= self.max_depth_m,
+            None if depth is None else depth <= self.max_depth_m,
         )
         pixels = corners.astype(np.float64)
         ids = self.map.new_points(pixels, index)
-        inverse_depths = self._inverse_depths(new, pixels)
+        inverse_depths = inverse_depths_at(depth, pixels, self.max_depth_m)
         keyframe.see(ids, pixels, inverse_depths)
         self.tracker.add(ids, corners)
         known = np.isfinite(inverse_depths)

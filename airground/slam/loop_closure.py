@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from airground.config import KeyframeSlam
-from airground.core.arrays import F32, F64
+from airground.core.arrays import F32
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam.depth_lookup import inverse_depths_at
@@ -124,7 +124,8 @@ class LoopCloser:
         T_old_newest = self.map.keyframes[old].state.pose().inverse() @ T_map_rig
         last = len(self.map.keyframes) - 1
         straighten(self.map, Edge(old, last, T_old_newest, float(len(found.ids))))
-        newest.see(found.ids, found.pixels, self._inverse_depths(found, depth))
+        depths = inverse_depths_at(depth, found.pixels, self.max_depth_m)
+        newest.see(found.ids, found.pixels, depths)
         self.adjuster.adjust_all(inertial)
         fitting = np.isin(found.ids, newest.ids) & self.map.mapped(found.ids)
         left = sum(len(keyframe.ids) for keyframe in self.map.keyframes) - fitting.sum()
@@ -135,8 +136,3 @@ class LoopCloser:
         self.tracker.add(found.ids[fitting], found.pixels[fitting])
         self.tracker.thin(CROWDED * self.parameters.corner_spacing_px)
         return True
-
-    def _inverse_depths(self, found: Found, depth: F32 | None) -> F64:
-        if depth is None:
-            return np.full(len(found.ids), np.nan)
-        return inverse_depths_at(depth, found.pixels, self.max_depth_m)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -57,6 +58,13 @@ class Keyframe:
         self.inverse_depths = self.inverse_depths[~wrong]
 
 
+def camera_poses(keyframes: Sequence[Keyframe], T_rig_camera: SE3) -> tuple[F64, F64]:
+    """(n, 3, 3) and (n, 3) `T_map_camera` of keyframes."""
+    rotations = np.array([keyframe.state.rotation for keyframe in keyframes])
+    positions = np.array([keyframe.state.position for keyframe in keyframes])
+    return rotations @ T_rig_camera.rotation, rotations @ T_rig_camera.translation + positions
+
+
 class SparseMap:
     """Keyframes in order of time, and points by their number.
 
@@ -91,12 +99,9 @@ class SparseMap:
         """Numbers of new candidates, first seen at (n, 2) pixels of keyframe `origin`."""
         count = len(pixels)
         while self._count + count > len(self.states):
-            self.positions = np.concatenate([self.positions, np.zeros_like(self.positions)])
-            self.states = np.concatenate([self.states, np.zeros_like(self.states)])
-            self.origins = np.concatenate([self.origins, np.zeros_like(self.origins)])
-            self.first_pixels = np.concatenate(
-                [self.first_pixels, np.zeros_like(self.first_pixels)]
-            )
+            for name in ("positions", "states", "origins", "first_pixels"):
+                array = getattr(self, name)
+                setattr(self, name, np.concatenate([array, np.zeros_like(array)]))
         ids = np.arange(self._count, self._count + count)
         self.origins[ids] = origin
         self.first_pixels[ids] = pixels

@@ -8,7 +8,8 @@ import numpy as np
 
 from airground.config import KeyframeSlam
 from airground.slam.feature_tracker import FeatureTracker
-from airground.slam.local_mapping import LocalMapper, NewKeyframe
+from airground.slam.frame import Frame
+from airground.slam.local_mapping import LocalMapper
 from airground.slam.map_adjustment import MapAdjuster
 from airground.slam.sparse_map import CANDIDATE, SparseMap
 from tests.slam.mapped_room import T_RIG_CAMERA, View, sees, true_points, view
@@ -43,7 +44,7 @@ class Mapping:
         tracker.image = seen.image
         measured = seen.depth if depth else None
         before = len(self.map)
-        self.mapper.insert(NewKeyframe(0, seen.image, measured, seen.state, None), False)
+        self.mapper.insert(Frame(0, seen.image, measured), seen.state, None, False)
         truth, clear = true_points(seen, self.map.first_pixels[before : len(self.map)])
         self.truth = np.concatenate([self.truth, truth])
         self.clear = np.concatenate([self.clear, clear])
