@@ -25,8 +25,8 @@ def inverse_depths_at(depth: F32 | None, pixels: Floats, max_depth_m: float) -> 
     """
     inverse = np.full(len(pixels), np.nan)
     if depth is not None:
-        depth, pixels = np.asarray(depth, np.float32), np.asarray(pixels, np.float64)
-        _look_up(depth, pixels, max_depth_m, inverse)
+        asked = np.asarray(pixels, np.float64)
+        _look_up(np.asarray(depth, np.float32), asked, max_depth_m, inverse)
     return inverse
 
 
