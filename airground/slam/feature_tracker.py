@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from airground.core.arrays import I64, U8, Floats, Mask
+from airground.core.arrays import F64, I64, U8, Floats, Mask
+from airground.core.camera import PinholeCamera
+from airground.core.se3 import SE3
 from airground.slam.optical_flow import flow
+from airground.slam.sparse_map import SparseMap
 
 NOTHING = np.empty((0, 2), np.float32)
 
@@ -89,3 +92,25 @@ class FeatureTracker:
         self.ids = np.concatenate([self.ids, ids])
         self.pixels = np.concatenate([self.pixels, np.asarray(pixels, np.float32).reshape(-1, 2)])
         self.failures = np.concatenate([self.failures, np.zeros(len(ids), np.int64)])
+
+
+def expected_pixels(
+    sparse_map: SparseMap, tracker: FeatureTracker, camera: PinholeCamera, here: SE3, there: SE3
+) -> F64:
+    """(N, 2) pixels of the tracker's corners in the next image.
+
+    Map points go by their place, other corners as if they were as far as most map points.
+    `here` and `there` are `T_map_camera` of the newest image and, as predicted, of the next.
+    """
+    pixels = tracker.pixels.astype(np.float64)
+    if len(pixels) == 0:
+        return pixels
+    z = (here.inverse() @ sparse_map.positions[tracker.ids])[:, 2]
+    known = sparse_map.mapped(tracker.ids) & (z > 0)
+    if known.any():
+        z = np.where(known, z, np.median(z[known]))
+    else:  # no depth to go by: only the turn counts
+        z, there = np.ones(len(z)), SE3(there.rotation, here.translation)
+    rays = np.column_stack([pixels, np.ones(len(z))]) @ np.linalg.inv(camera.matrix()).T
+    expected = camera.project(there.inverse() @ (here @ (rays * z[:, None])))
+    return np.where(np.isfinite(expected), expected, pixels)

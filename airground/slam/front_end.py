@@ -92,6 +92,24 @@ class TrackedPose:
             freeze(self, "covariance", (6, 6), np.float64)
 
 
+class PoseLog:
+    """The poses that a front end has given, in order of time, for one that never corrects them."""
+
+    def __init__(self) -> None:
+        self._stamps: list[int] = []
+        self._poses: list[SE3] = []
+
+    def tracked(self, stamp_ns: int, T_map_camera: SE3) -> TrackedPose:
+        """Note a pose, and return it as a front end does."""
+        self._stamps.append(stamp_ns)
+        self._poses.append(T_map_camera)
+        return TrackedPose(stamp_ns, Tracking.TRACKED, T_map_camera)
+
+    def trajectory(self) -> Trajectory | None:
+        """Every pose noted; None before the first."""
+        return Trajectory.from_poses(self._stamps, self._poses) if self._poses else None
+
+
 Image_contra = TypeVar("Image_contra", MavImage, GroundImage, contravariant=True)
 
 

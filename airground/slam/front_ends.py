@@ -16,8 +16,7 @@ from airground.config import Config
 from airground.core.messages import GroundImage, MavImage, RobotCalibration
 from airground.core.trajectory import Trajectory
 from airground.errors import InputError
-from airground.slam.baselines.open3d_odometry import open3d_odometry
-from airground.slam.baselines.opencv_odometry import opencv_odometry
+from airground.slam.baselines.library_odometry import open3d_odometry, opencv_odometry
 from airground.slam.baselines.trajectory_file import TrajectoryFile
 from airground.slam.front_end import FrontEnd
 from airground.slam.monocular import MonocularSlam
@@ -41,11 +40,7 @@ class Ingredients:
     trajectory: Trajectory | None = None
 
     def given_trajectory(self) -> Trajectory:
-        """The trajectory.
-
-        Raises:
-            InputError: There is none.
-        """
+        """The trajectory; an InputError if there is none."""
         if self.trajectory is None:
             raise InputError("the front end 'file' needs a trajectory")
         return self.trajectory

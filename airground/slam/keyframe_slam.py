@@ -18,10 +18,9 @@ from airground.core.trajectory import Trajectory
 from airground.slam.culling import KeyframeCuller
 from airground.slam.depth_lookup import inverse_depths_at
 from airground.slam.doubt import Doubt, jumps, surprising
-from airground.slam.expected_pixels import expected_pixels
-from airground.slam.feature_tracker import FeatureTracker
+from airground.slam.feature_tracker import FeatureTracker, expected_pixels
 from airground.slam.frame import Frame
-from airground.slam.frame_pose import frame_pose
+from airground.slam.frame_pose import frame_pose, with_shared_errors
 from airground.slam.front_end import TrackedCorners
 from airground.slam.geometry.pose_estimation import PoseFit
 from airground.slam.image_turn import ImageTurn
@@ -32,7 +31,6 @@ from airground.slam.local_mapping import LocalMapper
 from airground.slam.loop_closure import LoopCloser
 from airground.slam.map_adjustment import MapAdjuster
 from airground.slam.motion_model import MotionModel, Prediction
-from airground.slam.pose_covariance import with_shared_errors
 from airground.slam.recovery import Recovery
 from airground.slam.rig_state import RigState
 from airground.slam.sparse_map import SparseMap

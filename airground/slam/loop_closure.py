@@ -11,16 +11,16 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from airground.config import KeyframeSlam
-from airground.core.arrays import F32
+from airground.core.arrays import F32, F64, I8, I64
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam.depth_lookup import inverse_depths_at
 from airground.slam.feature_tracker import FeatureTracker
 from airground.slam.local_mapping import CROWDED
 from airground.slam.map_adjustment import MapAdjuster
-from airground.slam.map_snapshot import MapSnapshot
 from airground.slam.pose_graph import MIN_SHARED, Edge, straighten
 from airground.slam.recovery import Found, Recovery
+from airground.slam.rig_state import RigState
 from airground.slam.sparse_map import SparseMap
 
 EVERY = 3
@@ -44,15 +44,7 @@ MAX_LOST = 0.03
 
 @dataclass(eq=False)
 class LoopCloser:
-    """Recognizes old places and straightens the map by them.
-
-    Attributes:
-        map, tracker: Map and followed corners, changed in place.
-        adjuster, recovery: Bundle adjustment and relocalization in the map.
-        camera, T_rig_camera: The robot's camera.
-        parameters: The robot's section of the configuration.
-        max_depth_m: Largest depth to use [m].
-    """
+    """Recognizes old places and straightens the map by them."""
 
     map: SparseMap
     tracker: FeatureTracker
@@ -65,14 +57,11 @@ class LoopCloser:
     _passed_over: int = field(default=0, init=False)
 
     def close(self, depth: F32 | None, inertial: bool) -> bool:
-        """Look whether the newest keyframe shows an old place; if so, correct the whole map.
+        """Correct the whole map if the newest keyframe shows an old place; returns whether it did.
 
         Args:
             depth: (height, width) depth of the newest keyframe [m]; None without a depth camera.
             inertial: Whether the map is metric and gravity-aligned by the accelerometer.
-
-        Returns:
-            Whether the map was corrected.
         """
         first_recent = len(self.map.keyframes) - 1 - self.parameters.window
         # Without depth or accelerometer the scale drifts, too, which this cannot mend.
@@ -136,3 +125,43 @@ class LoopCloser:
         self.tracker.add(found.ids[fitting], found.pixels[fitting])
         self.tracker.thin(CROWDED * self.parameters.corner_spacing_px)
         return True
+
+
+@dataclass(frozen=True, eq=False)
+class MapSnapshot:
+    """What adjustment changes of a map, to restore when a correction proves wrong.
+
+    Attributes:
+        states: States of the keyframes.
+        sightings: `ids`, `pixels` and `inverse_depths` of the keyframes, which are replaced
+            and never written to.
+        positions, point_states: Positions and states of the points.
+    """
+
+    states: list[RigState]
+    sightings: list[tuple[I64, F64, F64]]
+    positions: F64
+    point_states: I8
+
+    @classmethod
+    def of(cls, sparse_map: SparseMap) -> MapSnapshot:
+        """The map as it is now."""
+        keyframes = sparse_map.keyframes
+        return cls(
+            [keyframe.state for keyframe in keyframes],
+            [(keyframe.ids, keyframe.pixels, keyframe.inverse_depths) for keyframe in keyframes],
+            sparse_map.positions.copy(),
+            sparse_map.states.copy(),
+        )
+
+    def sighting_count(self) -> int:
+        """How often a point was seen."""
+        return sum(len(ids) for ids, _, _ in self.sightings)
+
+    def restore(self, sparse_map: SparseMap) -> None:
+        """Undo; the map must have neither new keyframes nor new points since."""
+        for n, keyframe in enumerate(sparse_map.keyframes):
+            keyframe.state = self.states[n]
+            keyframe.ids, keyframe.pixels, keyframe.inverse_depths = self.sightings[n]
+        sparse_map.positions[:] = self.positions
+        sparse_map.states[:] = self.point_states

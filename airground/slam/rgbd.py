@@ -11,7 +11,6 @@ from airground.core.trajectory import Trajectory
 from airground.slam.frame import Frame, require_order
 from airground.slam.front_end import TrackedPose, Tracking
 from airground.slam.keyframe_slam import KeyframeSlam
-from airground.slam.pose_covariance import DEPTH_SCALE_SIGMA, LEVEL_SIGMA
 from airground.slam.starts import StandStill, level_start
 
 HAND_HELD = 1.5
@@ -19,6 +18,10 @@ HAND_HELD = 1.5
 while its rows are read out."""
 MIN_FIRST_POINTS = 40
 """Least number of corners with depth in a map's first image."""
+DEPTH_SCALE_SIGMA = 3e-3
+"""Relative standard deviation of a depth camera's calibrated scale."""
+LEVEL_SIGMA = np.deg2rad(0.3)
+"""Standard deviation of the vertical at rest per axis [rad]: an accelerometer bias of 50 mm/s^2."""
 
 
 class RgbdSlam:

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from airground.core.messages import GroundImage, ImuSamples, MavImage
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
-from airground.slam.baselines.frame_to_frame import FrameToFrame
-from airground.slam.baselines.level_start import LevelStart
+from airground.slam.baselines.frame_to_frame import FrameToFrame, LevelStart
 from airground.slam.baselines.trajectory_file import TrajectoryFile
 from airground.slam.front_end import Tracking
 from tests.slam.synthetic_world import ground_sequence

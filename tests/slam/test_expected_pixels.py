@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airground.core.se3 import SE3
-from airground.slam.expected_pixels import expected_pixels
-from airground.slam.feature_tracker import FeatureTracker
+from airground.slam.feature_tracker import FeatureTracker, expected_pixels
 from airground.slam.sparse_map import SparseMap
 from tests.slam.views import CAMERA, down_at, observe, seen_points
 

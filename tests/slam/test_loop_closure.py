@@ -16,7 +16,6 @@ from airground.slam.front_end import TrackedPose
 from airground.slam.geometry.descriptors import describe
 from airground.slam.keyframe_slam import KeyframeSlam
 from airground.slam.local_mapping import MIN_REUSED
-from airground.slam.map_snapshot import MapSnapshot
 from airground.slam.recovery import Found
 from airground.slam.rgbd import RgbdSlam
 from tests.slam.synthetic_world import Sequence, ground_sequence
@@ -136,7 +135,7 @@ class Twin:
         # What it followed stays; only its looks are those of the first keyframe.
         index.add(number, first.image, newest.ids, newest.pixels)
         index._descriptors[number] = describe(first.image, first.pixels).descriptors
-        self.before = MapSnapshot.of(self.slam.map)
+        self.before = loop_closure.MapSnapshot.of(self.slam.map)
         self.followed = self.slam.tracker.ids.copy()
 
     def close(self) -> bool:
@@ -145,7 +144,7 @@ class Twin:
         return self.slam._loops.close(image.depth, inertial=False)  # type: ignore[union-attr]
 
     def assert_unchanged(self) -> None:
-        now, before = MapSnapshot.of(self.slam.map), self.before
+        now, before = loop_closure.MapSnapshot.of(self.slam.map), self.before
         for a, b in zip(now.states, before.states, strict=True):
             np.testing.assert_array_equal(a.pose().matrix(), b.pose().matrix())
         for seen, seen_before in zip(now.sightings, before.sightings, strict=True):

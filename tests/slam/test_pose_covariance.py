@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from airground.slam import so3
-from airground.slam.pose_covariance import MOUNTING_SIGMA, with_shared_errors
+from airground.slam.frame_pose import MOUNTING_SIGMA, with_shared_errors
 
 
 def test_the_covariance_is_that_of_drawn_scales_tilts_and_mountings() -> None:

@@ -6,8 +6,7 @@ import numpy as np
 
 from airground.core.messages import GroundImage, ImuSamples, MavImage
 from airground.core.trajectory import Trajectory
-from airground.slam.baselines.pose_log import PoseLog
-from airground.slam.front_end import TrackedPose, Tracking
+from airground.slam.front_end import PoseLog, TrackedPose, Tracking
 
 
 class TrajectoryFile:

@@ -8,8 +8,7 @@ Jacobians by rotations on the left, R <- exp(dphi) R, as in `residuals`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -26,8 +25,7 @@ INTEGRATION_NOISE = 1e-6
 velocity and position have the same noise, and their covariance alone would be singular."""
 
 
-@dataclass(frozen=True, eq=False)
-class PackedMotions:
+class PackedMotions(NamedTuple):
     """All inertial factors, one array for each quantity.
 
     Attributes:
@@ -53,14 +51,7 @@ class PackedMotions:
 def pack(factors: Sequence[InertialFactor]) -> PackedMotions:
     """Lay factors out for the kernel."""
     motions = [factor.preintegration for factor in factors]
-    count = len(motions)
-    by_biases = np.zeros((count, 9, 6))
-    by_biases[:, 0:3, 0:3] = _stack([m.rotation_by_gyro_bias for m in motions], 3, 3)
-    by_biases[:, 3:6, 0:3] = _stack([m.velocity_by_gyro_bias for m in motions], 3, 3)
-    by_biases[:, 3:6, 3:6] = _stack([m.velocity_by_accelerometer_bias for m in motions], 3, 3)
-    by_biases[:, 6:9, 0:3] = _stack([m.position_by_gyro_bias for m in motions], 3, 3)
-    by_biases[:, 6:9, 3:6] = _stack([m.position_by_accelerometer_bias for m in motions], 3, 3)
-    whitening = np.zeros((count, 15, 15))
+    whitening = np.zeros((len(motions), 15, 15))
     # L with covariance = L L': its inverse makes the covariance one.
     covariances = _stack([m.covariance for m in motions], 9, 9)
     lower = np.linalg.cholesky(covariances * (1.0 + INTEGRATION_NOISE * np.eye(9)))
@@ -73,13 +64,8 @@ def pack(factors: Sequence[InertialFactor]) -> PackedMotions:
         rotations=_stack([m.rotation for m in motions], 3, 3),
         velocities=_stack([m.velocity for m in motions], 3),
         positions=_stack([m.position for m in motions], 3),
-        biases=np.hstack(
-            [
-                _stack([m.gyro_bias for m in motions], 3),
-                _stack([m.accelerometer_bias for m in motions], 3),
-            ]
-        ),
-        by_biases=by_biases,
+        biases=_stack([[*m.gyro_bias, *m.accelerometer_bias] for m in motions], 6),
+        by_biases=_stack([m.by_biases() for m in motions], 9, 6),
         whitening=whitening,
     )
 

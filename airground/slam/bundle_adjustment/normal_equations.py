@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -51,8 +52,7 @@ class Linearization:
     headings: F64
 
 
-@dataclass(frozen=True, eq=False)
-class NormalEquations:
+class NormalEquations(NamedTuple):
     """Normal equations of the F moving keyframes, points eliminated.
 
     Unknowns are the poses (rotation, position) of all keyframes and then, where there are
@@ -139,18 +139,7 @@ class Model:
         )
         if self.inertial:
             cost += inertial_residuals.linearize_motions(
-                motions.firsts,
-                motions.durations,
-                motions.rotations,
-                motions.velocities,
-                motions.positions,
-                motions.biases,
-                motions.by_biases,
-                motions.whitening,
-                at.rotations,
-                at.vectors,
-                motion_residuals,
-                motion_jacobians,
+                *motions, at.rotations, at.vectors, motion_residuals, motion_jacobians
             )
         cost += priors.linearize_priors(
             self.sharpness,
@@ -186,12 +175,7 @@ class Model:
                 self.slots,
                 at.motion_residuals,
                 at.motion_jacobians,
-                out.poses,
-                out.chain,
-                out.links,
-                out.coupling,
-                out.gradient,
-                out.diagonal,
+                *out,
             )
         priors.add_priors(
             self.sharpness,

@@ -8,7 +8,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from airground.core.arrays import F64, I64, Mask, freeze, read_only
+from airground.core.arrays import F64, I64, Mask, freeze
 from airground.slam.inertial.preintegration import Preintegration
 
 
@@ -43,17 +43,16 @@ class States:
     still: Mask | None = None
 
     def __post_init__(self) -> None:
-        rotations = read_only(self.rotations, "rotations", (None, 3, 3), np.float64)
-        arrays = {"rotations": rotations}
-        for name in ("positions", "velocities", "gyro_biases", "accelerometer_biases"):
-            shape = (len(rotations), 3)
-            arrays[name] = read_only(getattr(self, name), name, shape, np.float64)
-        for name, array in arrays.items():
+        freeze(self, "rotations", (None, 3, 3), np.float64)
+        vectors = ("positions", "velocities", "gyro_biases", "accelerometer_biases")
+        for name in vectors:
+            freeze(self, name, (len(self), 3), np.float64)
+        for name in ("rotations", *vectors):
+            array = getattr(self, name)
             if not np.isfinite(array).all():
                 raise ValueError(f"{name}: keyframe {_first_bad(array)} is not finite")
-            object.__setattr__(self, name, array)
         if self.still is not None:
-            freeze(self, "still", (len(rotations),), np.bool_)
+            freeze(self, "still", (len(self),), np.bool_)
 
     def __len__(self) -> int:
         return len(self.rotations)
@@ -82,12 +81,11 @@ class Observations:
     inverse_depth_sigmas: F64
 
     def __post_init__(self) -> None:
-        m = len(self.keyframes)
         for name in ("keyframes", "points"):
-            freeze(self, name, (m,), np.int64)
-        freeze(self, "pixels", (m, 2), np.float64)
+            freeze(self, name, (len(self),), np.int64)
+        freeze(self, "pixels", (len(self), 2), np.float64)
         for name in ("sigmas_px", "inverse_depths", "inverse_depth_sigmas"):
-            freeze(self, name, (m,), np.float64)
+            freeze(self, name, (len(self),), np.float64)
         if not np.isfinite(self.pixels).all():
             raise ValueError(f"pixels: observation {_first_bad(self.pixels)} is not finite")
         if not (self.sigmas_px > 0).all():

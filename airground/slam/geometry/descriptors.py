@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numba import njit
 
-from airground.core.arrays import F64, I64, U8, U64, Floats, read_only
+from airground.core.arrays import F64, I64, U8, U64, Floats, freeze
 
 SCALE = 1.5
 """Factor by which images are reduced first: less noise, and a larger patch."""
@@ -40,10 +40,8 @@ class Described:
     descriptors: U64
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "pixels", read_only(self.pixels, "pixels", (None, 2), np.float64))
-        shape = (len(self.pixels), 4)
-        descriptors = read_only(self.descriptors, "descriptors", shape, np.uint64)
-        object.__setattr__(self, "descriptors", descriptors)
+        freeze(self, "pixels", (None, 2), np.float64)
+        freeze(self, "descriptors", (len(self.pixels), 4), np.uint64)
 
 
 def describe(image: U8, pixels: Floats) -> Described:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from airground.core.arrays import F64, Mask, read_only
+from airground.core.arrays import F64, Mask, freeze
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3, nearest_rotation
 from airground.slam import so3
@@ -47,9 +47,8 @@ class PoseFit:
     iterations: int
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "inliers", read_only(self.inliers, "inliers", (None,), np.bool_))
-        covariance = read_only(self.covariance, "covariance", (6, 6), np.float64)
-        object.__setattr__(self, "covariance", covariance)
+        freeze(self, "inliers", (None,), np.bool_)
+        freeze(self, "covariance", (6, 6), np.float64)
 
 
 def estimate_pose(

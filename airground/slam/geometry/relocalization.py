@@ -101,9 +101,7 @@ class KeyframeIndex:
         ids = list(self._point_ids) if among is None else among
         if not ids:
             return []
-        groups = [self._descriptors[k] for k in ids]
-        starts = np.concatenate([[0], np.cumsum([len(group) for group in groups])])
-        counts = votes(query.descriptors[:VOTERS], np.concatenate(groups), starts)
+        counts = self._votes(query.descriptors[:VOTERS], ids)
         return [ids[i] for i in np.argsort(-counts, kind="stable")[:CANDIDATES]]
 
     def resembling(self, keyframe_id: int, among: list[int]) -> list[int]:
@@ -114,10 +112,14 @@ class KeyframeIndex:
         if not among:
             return []
         corners = self._descriptors[keyframe_id]
+        counts = self._votes(corners, among)
+        return [k for k, n in zip(among, counts, strict=True) if n >= MIN_ALIKE * len(corners) > 0]
+
+    def _votes(self, descriptors: U64, among: list[int]) -> I64:
+        """(g,) how many of the descriptors have a likeness in each of some keyframes."""
         groups = [self._descriptors[k] for k in among]
         starts = np.concatenate([[0], np.cumsum([len(group) for group in groups])])
-        counts = votes(corners, np.concatenate(groups), starts)
-        return [k for k, n in zip(among, counts, strict=True) if n >= MIN_ALIKE * len(corners) > 0]
+        return votes(descriptors, np.concatenate(groups), starts)
 
     def match(self, query: Described, keyframe_id: int) -> Matches:
         """The keyframe's map points among an image's corners, some of them wrong."""

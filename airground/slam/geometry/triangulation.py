@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from airground.core.arrays import F64, Mask, read_only
+from airground.core.arrays import F64, Mask, freeze
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 
@@ -39,12 +39,10 @@ class Triangulated:
     good: Mask
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "points", read_only(self.points, "points", (None, 3), np.float64))
+        freeze(self, "points", (None, 3), np.float64)
         for name in ("depth_a", "inverse_depth_sigma", "parallax_rad", "reprojection_px"):
-            array = read_only(getattr(self, name), name, (len(self.points),), np.float64)
-            object.__setattr__(self, name, array)
-        good = read_only(self.good, "good", (len(self.points),), np.bool_)
-        object.__setattr__(self, "good", good)
+            freeze(self, name, (len(self.points),), np.float64)
+        freeze(self, "good", (len(self.points),), np.bool_)
 
 
 def triangulate_pairs(

@@ -30,7 +30,7 @@ def join(first: Preintegration, second: Preintegration) -> Preintegration:
     # The second's velocity and position are in the axes of the rig between them.
     beyond = np.eye(9)
     beyond[3:6, 3:6] = beyond[6:9, 6:9] = R
-    jacobian = onward @ _by_biases(first) + beyond @ _by_biases(second)
+    jacobian = onward @ first.by_biases() + beyond @ second.by_biases()
     return Preintegration(
         first.duration_s + t,
         _frozen(R @ turned),
@@ -47,17 +47,6 @@ def join(first: Preintegration, second: Preintegration) -> Preintegration:
         float(np.hypot(first.gyro_bias_sigma, second.gyro_bias_sigma)),
         float(np.hypot(first.accelerometer_bias_sigma, second.accelerometer_bias_sigma)),
         max(first.longest_gap_s, second.longest_gap_s),
-    )
-
-
-def _by_biases(motion: Preintegration) -> F64:
-    """(9, 6) rotation, velocity and position by the biases of gyro and accelerometer."""
-    return np.block(
-        [
-            [motion.rotation_by_gyro_bias, np.zeros((3, 3))],
-            [motion.velocity_by_gyro_bias, motion.velocity_by_accelerometer_bias],
-            [motion.position_by_gyro_bias, motion.position_by_accelerometer_bias],
-        ]
     )
 
 

@@ -71,6 +71,16 @@ class Preintegration:
     accelerometer_bias_sigma: float
     longest_gap_s: float
 
+    def by_biases(self) -> F64:
+        """(9, 6) derivative of rotation, velocity and position by the two biases."""
+        jacobian = np.zeros((9, 6))
+        jacobian[0:3, 0:3] = self.rotation_by_gyro_bias
+        jacobian[3:6, 0:3] = self.velocity_by_gyro_bias
+        jacobian[3:6, 3:6] = self.velocity_by_accelerometer_bias
+        jacobian[6:9, 0:3] = self.position_by_gyro_bias
+        jacobian[6:9, 3:6] = self.position_by_accelerometer_bias
+        return jacobian
+
     def corrected(
         self, gyro_bias: Vector, accelerometer_bias: Vector
     ) -> tuple[Rotation, Vector, Vector]:

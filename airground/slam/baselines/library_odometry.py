@@ -1,9 +1,10 @@
-"""Open3D's RGB-D odometry, hybrid of colour and point-to-plane residuals (Park et al. 2017)."""
+"""RGB-D odometry of Open3D and OpenCV, as front ends for the ground robot."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import cv2
 import numpy as np
 
 from airground.core.messages import GroundImage, RobotCalibration
@@ -19,7 +20,7 @@ MIN_FITNESS = 0.1
 
 
 def open3d_odometry(calibration: RobotCalibration) -> FrameToFrame:
-    """Front end for the ground robot."""
+    """Hybrid of colour and point-to-plane residuals (Park et al. 2017)."""
     return FrameToFrame(calibration, _Hybrid(calibration))
 
 
@@ -70,3 +71,29 @@ class _Hybrid:
             self._geometry.Image(self._tensor(np.ascontiguousarray(image.colour))),
             self._geometry.Image(self._tensor(depth)),
         )
+
+
+def opencv_odometry(calibration: RobotCalibration) -> FrameToFrame:
+    """Photometric and depth residuals on a pyramid (`cv2.Odometry`)."""
+    return FrameToFrame(calibration, _RgbDepth(calibration))
+
+
+class _RgbDepth:
+    """Aligns two frames with `cv2.Odometry`, colour and depth together."""
+
+    def __init__(self, calibration: RobotCalibration) -> None:
+        settings = cv2.OdometrySettings()
+        settings.setCameraMatrix(calibration.camera.matrix().astype(np.float32))
+        self._odometry = cv2.Odometry(
+            cv2.OdometryType_RGB_DEPTH, settings, cv2.OdometryAlgoType_COMMON
+        )
+
+    def align(self, previous: GroundImage, image: GroundImage) -> SE3 | None:
+        """`T_previous_image`; None where OpenCV says that it failed."""
+        # The pose that OpenCV finds carries points of the first frame into the second.
+        found, matrix = self._odometry.compute(
+            np.array(image.depth), image.colour, np.array(previous.depth), previous.colour
+        )
+        if not found or not np.isfinite(matrix).all():
+            return None
+        return SE3.from_matrix(matrix)
