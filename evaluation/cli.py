@@ -1,7 +1,6 @@
 """The command `airground`: picks the verb, reads its options, runs it.
 
-A verb is a dataclass in `evaluation.commands`: its docstring is the help, its fields are
-the options, `main()` is what it does. Only the verb that was asked for is imported, and
+A verb is a dataclass in `evaluation.commands`. Only the verb that was asked for is imported, and
 heavy imports wait for its `main()`, so that `--help` answers at once.
 """
 

@@ -21,15 +21,7 @@ from evaluation.bench.work import Work
 
 @dataclass(frozen=True)
 class Curve:
-    """One size that is varied.
-
-    Attributes:
-        name: Name in JSON.
-        title: Name of the stage that is timed.
-        parameter: The varied parameter with its unit, as a user sets it.
-        values: Values of the parameter.
-        make: Makes the work at one value.
-    """
+    """One size that is varied: title of the timed stage, and parameter with its unit."""
 
     name: str
     title: str

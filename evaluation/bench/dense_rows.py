@@ -32,14 +32,7 @@ DECODED = 60
 
 
 class Sweep:
-    """One depth map under construction, view after view as the pipeline adds them.
-
-    Args:
-        camera: Intrinsics of the images.
-        reference: View of the depth map.
-        views: Views that are compared with it, in order of time.
-        config: The pipeline's parameters.
-    """
+    """One depth map under construction, view after view in order of time, as the pipeline does."""
 
     def __init__(
         self, camera: PinholeCamera, reference: PosedImage, views: list[PosedImage], config: Config
@@ -125,12 +118,7 @@ def depth_map(material: Material) -> Work:
 
 
 class VoxelWork:
-    """The volume of one surface and what is computed in it, with memory kept between calls.
-
-    Args:
-        depth_maps: Depth maps that are fused.
-        config: The pipeline's parameters.
-    """
+    """The volume of one surface and what is computed in it, with memory kept between calls."""
 
     def __init__(self, depth_maps: list[DepthMap], config: Config) -> None:
         self.depth_maps, self.parameters = depth_maps, config.fusion

@@ -22,13 +22,7 @@ STRICT = ConfigDict(extra="forbid")
 
 @dataclass(frozen=True, config=STRICT)
 class Speed:
-    """The most that a number of cores can do, as probed.
-
-    Attributes:
-        threads: Number of cores.
-        bandwidth_gb_s: To and from memory.
-        arithmetic_gflop_s: float32 additions and multiplications.
-    """
+    """The most that a number of cores can do, as probed: to and from memory, and in float32."""
 
     threads: int
     bandwidth_gb_s: Amount
@@ -45,12 +39,8 @@ class Speed:
 
 @dataclass(frozen=True, config=STRICT)
 class Floor:
-    """What any program must do for one call of a row.
-
-    Attributes:
-        bytes_moved: To and from memory, of data that fit no cache.
-        operations: float32 additions and multiplications.
-    """
+    """What any program must do for one call of a row: bytes of data that fit no cache, moved to
+    and from memory, and float32 additions and multiplications."""
 
     bytes_moved: Amount
     operations: Amount
@@ -119,10 +109,8 @@ def cost_map(cells: int) -> Floor:
     """Eq. 2 at all offsets by masked correlations.
 
     Six transforms of values, squares and masks and three back: count, sum and sum of squares
-    of the differences; six complex products.
-
-    Args:
-        cells: Cells of the searched square, widened by the aerial map.
+    of the differences; six complex products. `cells` are those of the searched square, widened
+    by the aerial map.
     """
     return transforms(cells, 9) + Floor(0, 6 * 6 * cells / 2)
 
@@ -135,10 +123,8 @@ def heading_search(cells: int, headings: int) -> Floor:
 def particles(cells: int, count: int, turned: bool) -> Floor:
     """Six sums over the overlap at each particle, heights and mask interpolated.
 
-    Args:
-        cells: Filled cells of the aerial map.
-        count: Number of particles.
-        turned: Whether each has a heading, so that every cell has its own place and weights.
+    `cells` are the filled ones of the aerial map. If particles are `turned` by a heading, every
+    cell has its own place and weights.
     """
     each = (7 + 7 + 1) + 10 + (8 + 6 if turned else 0)
     return Floor(0, each * cells * count)

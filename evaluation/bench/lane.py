@@ -45,9 +45,7 @@ T = TypeVar("T")
 class Opened:
     """What a lane measured while it made its material.
 
-    Attributes:
-        speed: The most that its cores can do.
-        played: The pipeline's run over the recording; None unless it was played to its end.
+    `played` is None unless the recording was played to its end.
     """
 
     speed: Speed
@@ -56,14 +54,7 @@ class Opened:
 
 @dataclass(frozen=True)
 class Facts:
-    """What is known of a row before it is timed.
-
-    Attributes:
-        size: How large its work is, in words.
-        floor: The least that it takes; None where that is unknown.
-        peers: Names of the peers whose package is installed.
-        missing: Names of the others.
-    """
+    """What is known of a row before it is timed; `peers` are installed, `missing` are not."""
 
     size: str
     floor: Floor | None
@@ -123,11 +114,7 @@ class Lane:
 
 
 class LaneProcess:
-    """A lane in a process of its own, with the methods of `Lane`.
-
-    Attributes:
-        threads: Number of its cores.
-    """
+    """A lane in a process of its own, with the methods of `Lane`."""
 
     def __init__(self, threads: int) -> None:
         self.threads = threads

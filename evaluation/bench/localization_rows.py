@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airground.augmentation import Augmentation
 from airground.config import Config, paper
-from airground.core.belief import HeightMap
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
 from airground.localization.cost_map import reach_of
@@ -34,21 +33,13 @@ SLANTED = np.ones(3) / np.sqrt(3.0)
 """The start of refinement is shifted and turned along this axis: all six directions count."""
 
 
-@dataclass
 class Maps:
-    """Both height maps of one surface.
+    """Both height maps of one surface."""
 
-    Attributes:
-        material: The surface and the ground map.
-        config: Resolution, cost, and search region.
-    """
-
-    material: Material
-    config: Config
-    pair: HeightMapPair = field(init=False)
-
-    def __post_init__(self) -> None:
+    def __init__(self, material: Material, config: Config) -> None:
+        self.material, self.config = material, config
         self.pair = self.make()
+        self.aerial, self.ground = self.pair.aerial, self.pair.ground
 
     def make(self) -> HeightMapPair:
         """The aerial map about its camera, and the ground map as far as the search reaches."""
@@ -56,14 +47,6 @@ class Maps:
         pair = pair_of(sighting, self.config)
         _ = pair.ground  # computes both
         return pair
-
-    @property
-    def aerial(self) -> HeightMap:
-        return self.pair.aerial
-
-    @property
-    def ground(self) -> HeightMap:
-        return self.pair.ground
 
     @property
     def size(self) -> str:
@@ -85,7 +68,8 @@ class Maps:
 
     def search(self) -> CostVolume:
         """The cost of every position, and of every heading where it is searched."""
-        robot, config = self.material.robot_position, self.config.localization
+        robot = self.material.sighting.T_ground_camera.translation[:2]
+        config = self.config.localization
         if self.pair.searched:
             return search_headings(self.aerial, self.ground, robot, config)
         return search_positions(self.aerial, self.ground, robot, self.pair.turn, config)
@@ -186,12 +170,7 @@ def icp(material: Material) -> Work:
 
 
 def refinement(material: Material, ground: PointCloud | None = None) -> Work:
-    """As `best` does it: the height maps give a start, then ICP.
-
-    Args:
-        material: The surface.
-        ground: The ground map; that of the material where None.
-    """
+    """As `best` does it: the height maps give a start, then ICP. None: the material's map."""
     return _refinement(material, material.config, ground or material.ground_cloud)
 
 

@@ -1,9 +1,8 @@
 """What this machine can do at most, and what else it does while a benchmark runs.
 
-Memory: the triad of the STREAM benchmark (McCalpin 1995), a = b + s c, on arrays that fit no
-cache; 24 bytes are counted per element. Arithmetic: float32 multiply-adds on values in the
-first-level cache, two operations each. The best of many short tries counts: other load slows
-them down, and seldom all of them.
+Memory: the triad of the STREAM benchmark (McCalpin 1995). Arithmetic: float32 multiply-adds on
+values in the first-level cache. The best of many short tries counts: other load slows them down,
+and seldom all of them.
 """
 
 from __future__ import annotations
@@ -79,11 +78,6 @@ class LoadAverage(NamedTuple):
     one_minute: float
     five_minutes: float
     fifteen_minutes: float
-
-
-def load_average() -> LoadAverage:
-    """The system's."""
-    return LoadAverage(*psutil.getloadavg())
 
 
 class LoadMeter:

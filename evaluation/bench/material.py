@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from airground.config import Config
 from airground.core.camera import PinholeCamera
@@ -93,11 +92,6 @@ class Material:
         return self.sighting.ground_cloud
 
     @property
-    def robot_position(self) -> NDArray[np.float64]:
-        """(2,) position of the ground robot in `ground` [m]."""
-        return self.sighting.T_ground_camera.translation[:2]
-
-    @property
     def heading(self) -> float:
         """Turn of `mav` in `ground` [rad]."""
         return self.T_ground_mav.heading()
@@ -107,10 +101,8 @@ class Material:
 class Played:
     """Times of the whole pipeline over the recording.
 
-    Attributes:
-        frame_ms: By robot ("mav", "ground"): processor time of each image, with the inertial
-            samples before it.
-        pipeline: Times and memory of the whole run.
+    `frame_ms` holds by robot ("mav", "ground") the processor time of each image, with the inertial
+    samples before it.
     """
 
     frame_ms: dict[str, list[float]]
@@ -122,11 +114,7 @@ def play(
 ) -> tuple[Material, Played | None]:
     """Run the pipeline with SLAM over a recording, as `run` does, and keep the rows' material.
 
-    Args:
-        recording: A recording of both robots.
-        config: The pipeline's parameters.
-        threads: Number of this process's cores, for the report.
-        whole: Play it to its end; else stop once there is material, and report no times.
+    Unless `whole`, stop once there is material, and report no times.
 
     Raises:
         InputError: No aerial surface could be aligned: there is no material.
@@ -159,21 +147,13 @@ def play(
 
 
 class MemoryLog:
-    """Consumes the pipeline's events; reads the memory held after each part of the recording.
-
-    Args:
-        recording: The recording that is played.
-        tracking: Numbers of the tracking processes.
-
-    Attributes:
-        resident_mib: Memory of all processes after each part [MiB]; empty if not counted.
-    """
+    """Reads the memory [MiB] that this and the tracking processes hold after each part of the
+    recording; `resident_mib` stays empty if it is not counted."""
 
     def __init__(self, recording: Recording, tracking: Sequence[int]) -> None:
         self._processes = (os.getpid(), *tracking)
         stamps_ns = recording.of(Source.GROUND).camera_stamps
-        first_ns, last_ns = int(stamps_ns[0]), int(stamps_ns[-1])
-        ends_ns = np.linspace(first_ns, last_ns, PARTS + 1)[1:]
+        ends_ns = np.linspace(int(stamps_ns[0]), int(stamps_ns[-1]), PARTS + 1)[1:]
         self._waiting_ns = [int(end_ns) for end_ns in ends_ns]
         self.resident_mib: list[float] = []
 

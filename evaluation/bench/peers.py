@@ -38,14 +38,7 @@ Reach = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Peer:
-    """The work of a row by another library.
-
-    Attributes:
-        name: Name for readers.
-        make: Makes its work from the material.
-        differs: How its work differs from ours.
-        package: Module that need not be installed; empty if none.
-    """
+    """The work of a row by another library; `package` need not be installed, and may be empty."""
 
     name: str
     make: Callable[[Material], Work]

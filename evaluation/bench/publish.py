@@ -41,21 +41,16 @@ def print_table(report: BenchReport, screen: Console) -> None:
 
 def markdown(report: BenchReport) -> str:
     """The table, the conditions and the exponents, for a page of the docs."""
-    lines = _markdown_table(header(report), body(report))
+    lines = text.markdown_table(header(report), body(report))
     lines += ["", *(f"- {line}" for line in footnotes(report))]
     if report.curves:
         titles = ["time of", "over", "power", "of CPU time", "medians [ms]"]
-        lines += ["", *_markdown_table(titles, [_curve(curve) for curve in report.curves])]
+        lines += ["", *text.markdown_table(titles, [_curve(curve) for curve in report.curves])]
     return "\n".join(lines) + "\n"
 
 
 def publish(results: Path, docs: Path) -> None:
-    """Refresh `speed.md` and its pictures.
-
-    Args:
-        results: A folder that `airground bench --out` has written.
-        docs: The folder of the docs.
-    """
+    """Refresh `speed.md` and its pictures by a folder that `airground bench --out` has written."""
     report = read_checked(BenchReport, results / "bench.json", KIND)
     page = docs / "speed.md"
     page.write_text(with_table(page.read_text(encoding="utf-8"), report), encoding="utf-8")
@@ -89,7 +84,8 @@ def body(report: BenchReport) -> list[list[str]]:
     lines = []
     for row in report.rows:
         first, *others = _peers(row) or [ABSENT]
-        lines.append([row.title, *map(_lane, row.lanes), *_marks(row), first, _memory(row)])
+        memory = text.formatted(row.peak_memory_mib, "{:.0f} MiB")
+        lines.append([row.title, *map(_lane, row.lanes), *_marks(row), first, memory])
         width = len(lines[-1])
         lines += [[*[""] * (width - 2), other, ""] for other in others]
     return lines
@@ -140,10 +136,6 @@ def footnotes(report: BenchReport) -> list[str]:
     return lines
 
 
-def _markdown_table(titles: list[str], rows: list[list[str]]) -> list[str]:
-    return ["| " + " | ".join(words) + " |" for words in (titles, ["---"] * len(titles), *rows)]
-
-
 def _curve(curve: CurveResult) -> list[str]:
     """Stage, parameter, both powers, and the times by value."""
     points = (f"{point.value:g}: {_ms(point.timing.median_ms)}" for point in curve.points)
@@ -170,10 +162,6 @@ def _peers(row: RowResult) -> list[str]:
     return [
         f"{peer.name} {_ms(peer.timing.median_ms)} ({peer.times_ours:.1f}x)" for peer in row.peers
     ]
-
-
-def _memory(row: RowResult) -> str:
-    return ABSENT if row.peak_memory_mib is None else f"{row.peak_memory_mib:.0f} MiB"
 
 
 def _peak(memory_mib: float | None) -> str:

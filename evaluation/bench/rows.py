@@ -16,13 +16,7 @@ from evaluation.setup.published import TABLE_I, TimedStage
 
 @dataclass(frozen=True)
 class Row:
-    """One line of the table.
-
-    Attributes:
-        stage: Name, title, group, and the time published in the paper.
-        make: Makes the work from the material.
-        target_ms: Median aimed at on two idle cores [ms]; None where no aim is set.
-    """
+    """One line of the table; `target_ms` is the median aimed at on two idle cores, if any."""
 
     stage: TimedStage
     make: Callable[[Material], Work]

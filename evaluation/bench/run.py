@@ -9,11 +9,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import psutil
+
 from airground.io.recording import Recording
 from evaluation.bench.curves import CURVES, Curve, CurvePoint, exponent
 from evaluation.bench.floors import Speed
 from evaluation.bench.lane import Lane, LaneProcess, Opened, lane_processes
-from evaluation.bench.machine import LoadAverage, LoadMeter, load_average
+from evaluation.bench.machine import LoadAverage, LoadMeter
 from evaluation.bench.report import (
     SCHEMA,
     BenchReport,
@@ -43,21 +45,15 @@ def run_benchmark(
     with_curves: bool,
     say: Callable[[str], None],
 ) -> BenchReport:
-    """Time rows on one core and on all.
+    """Time rows on one core and on all, over a recording of both robots.
 
-    Args:
-        path: A recording of both robots.
-        names: Names of the rows.
-        threads: Number of cores of the lane that uses all.
-        seconds_a_row: Time for a row with its peers [s].
-        with_curves: Also vary the sizes.
-        say: Takes a line about each step.
+    `seconds_a_row` is the time for a row with its peers; `say` takes a line about each step.
     """
     info = RunInfo.here(seed=0)
     recording = Recording.open(path)
     counts = sorted({1, threads})
     whole = any(name in PLAYED or name == PIPELINE for name in names)
-    load_before, meter = load_average(), LoadMeter()
+    load_before, meter = LoadAverage(*psutil.getloadavg()), LoadMeter()
     live = None
     if LIVE in names:
         say(f"playing {recording.scene} at its own rate")
@@ -199,6 +195,6 @@ def _machine(
         cores=info.cores,
         speeds=tuple(speed for _, speed in sorted(speeds.items())),
         load_before=load_before,
-        load_after=load_average(),
+        load_after=LoadAverage(*psutil.getloadavg()),
         other_cores=meter.other_cores(),
     )

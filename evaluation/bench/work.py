@@ -18,14 +18,7 @@ LEAST_ROUNDS = 3
 
 @dataclass(frozen=True, eq=False)
 class Work:
-    """Something to time.
-
-    Attributes:
-        run: One call of it.
-        before: Preparation before each call, which is not timed.
-        size: How large it is, in words.
-        floor: The least that it takes; None where that is unknown.
-    """
+    """Something to time: `before` prepares each call and is not timed; `size` is in words."""
 
     run: Callable[[], object]
     before: Callable[[], object] = lambda: None
@@ -35,12 +28,7 @@ class Work:
 
 @dataclass(frozen=True)
 class Sample:
-    """One call.
-
-    Attributes:
-        wall_ms: Time by the clock.
-        cpu_ms: Processor time of the whole process, all threads together.
-    """
+    """One call: time by the clock, and processor time of the process, all threads together."""
 
     wall_ms: float
     cpu_ms: float
@@ -69,12 +57,8 @@ def interleaved(
 ) -> dict[Key, list[Turn]]:
     """Let contenders take turns until the time is up, and at least `LEAST_ROUNDS` times.
 
-    Args:
-        contenders: Functions that take a turn of about the given seconds.
-        seconds: Time for all of them together, without the first turns, which compile.
-
-    Returns:
-        The turns of each contender, one per round.
+    `seconds` is the time for all of them together, without the first turns, which compile. Each
+    contender has one turn per round.
     """
     for take in contenders.values():
         take(0.0)

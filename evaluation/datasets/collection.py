@@ -1,9 +1,5 @@
 """Many recordings as one dataset, split by world, made in parallel and resumed where it stopped.
 
-    NAME/dataset.json    the plan: contents, and how they were made
-    NAME/DATASHEET.md    the same for people
-    NAME/PART/SCENE_sSEED/    recordings; PART is train or a part of --split
-
 Until all are made the folder is called `.NAME.partial`. Recordings appear in it when they are
 complete: after an interruption the next call makes only what is missing.
 """
@@ -37,11 +33,7 @@ SHEET, LOCK = "DATASHEET.md", ".lock"
 def make_dataset(plan: Plan, out: Path, jobs: int, threads: int) -> None:
     """Make what is missing of a dataset; nothing is made twice.
 
-    Args:
-        plan: Plan of the dataset.
-        out: Folder to make; it appears when it is complete.
-        jobs: Number of recordings made at a time.
-        threads: Number of processes that render, over all jobs.
+    `out` appears when it is complete; `threads` processes render, over all jobs.
 
     Raises:
         InputError: The folder exists, or an unfinished one has another plan, or is in use.
@@ -74,7 +66,6 @@ def make_dataset(plan: Plan, out: Path, jobs: int, threads: int) -> None:
 
 @contextmanager
 def _held(unfinished: Path) -> Iterator[None]:
-    """Lock the folder for this process."""
     unfinished.mkdir(parents=True, exist_ok=True)
     with (unfinished / LOCK).open("w") as lock:
         try:

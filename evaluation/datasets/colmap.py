@@ -1,10 +1,6 @@
 """A COLMAP model in text form, of true poses and true points (colmap.github.io/format).
 
-    images/mav/ images/ground/                         every tenth image
-    sparse/0/{cameras,images,points3D}.txt             as COLMAP's mapper writes them
-
-COLMAP's pixels: the centre of the upper left one is at (0.5, 0.5). Its poses map the world
-to the camera, quaternions are w x y z.
+The centre of the upper left pixel is at (0.5, 0.5). Poses map the world to the camera.
 """
 
 from __future__ import annotations
@@ -15,10 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from evaluation.datasets.simulated import Simulated, copy_images
-from evaluation.datasets.views import View, Views, choose_views
+from evaluation.datasets.views import PIXEL_CENTRE, View, Views, choose_views
 from sim.robots.motion import ROBOTS, Robot
 
-PIXEL_CENTRE = 0.5
 MIN_VIEWS = 2
 """Images that a track needs at least."""
 

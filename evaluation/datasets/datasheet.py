@@ -14,6 +14,7 @@ from airground import __version__
 from airground.io.header import Header, read_header
 from airground.io.layout import HEADER, TRUTH
 from airground.io.tum import read_tum
+from evaluation.setup.text import markdown_table
 from sim.robots.motion import ROBOTS
 from sim.scene import Scene
 from sim.sensors.presets import SensorPreset
@@ -47,14 +48,7 @@ def datasheet(
     sensors: SensorPreset,
     recordings: Sequence[tuple[str, Path]],
 ) -> str:
-    """The text of `DATASHEET.md`.
-
-    Args:
-        name: Name of the dataset.
-        scenes: All scenes in it.
-        sensors: Quality of the sensors.
-        recordings: Part and folder of each recording.
-    """
+    """The text of `DATASHEET.md`, from part and folder of each recording."""
     headers = [(part, folder, read_header(folder / HEADER)) for part, folder in recordings]
     lines = [
         f"# {name}",
@@ -79,16 +73,10 @@ def _parts(headers: Sequence[Recorded]) -> list[str]:
     parts: dict[str, list[Header]] = defaultdict(list)
     for part, _, header in headers:
         parts[part].append(header)
-    rows = [
-        [
-            part,
-            len(of),
-            f"{sum(h.duration_s for h in of):g}",
-            sum(h.frames.mav for h in of),
-            sum(h.frames.ground for h in of),
-        ]
-        for part, of in sorted(parts.items())
-    ]
+    rows = []
+    for part, of in sorted(parts.items()):
+        images = sum(h.frames.mav for h in of), sum(h.frames.ground for h in of)
+        rows.append([part, len(of), f"{sum(h.duration_s for h in of):g}", *images])
     columns = ["part", "recordings", "seconds", "MAV images", "ground images"]
     rule = "No world (scene and seed) is in two parts."
     return ["## Parts", "", rule, "", *_table(columns, rows)]
@@ -153,5 +141,4 @@ def _recordings(headers: Sequence[Recorded]) -> list[str]:
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> list[str]:
-    lines = [columns, ["---"] * len(columns), *rows]
-    return [*("| " + " | ".join(map(str, line)) + " |" for line in lines), ""]
+    return [*markdown_table(columns, rows), ""]

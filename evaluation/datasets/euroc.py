@@ -1,10 +1,6 @@
-"""The MAV as an EuRoC/ASL folder (Burri et al., IJRR 2016).
+"""The MAV as an EuRoC/ASL folder (Burri et al., IJRR 2016); docs/datasets.md lists it.
 
-mav0/body.yaml
-mav0/cam0/ imu0/                     as recorded; the body of T_BS is the IMU
-mav0/state_groundtruth_estimate0/    the IMU in the world at 200 Hz, its velocity and biases
-mav0/pointcloud0/                    the true surface, as in EuRoC's Vicon rooms
-mav0/mag0/                           in the same form; EuRoC has no magnetometer
+The body of T_BS is the IMU. EuRoC itself has no magnetometer (`mag0/`).
 """
 
 from __future__ import annotations

@@ -23,14 +23,7 @@ Robots = tuple[Robot, ...]
 
 @dataclass(frozen=True)
 class Format:
-    """A format that recordings are exported to.
-
-    Attributes:
-        write: Fills an empty folder with the data of these robots.
-        usual: Robots that it holds by default.
-        possible: Robots that it can hold.
-        because: Reason why it holds no others.
-    """
+    """A format that recordings are exported to; `because` says why it holds no other robots."""
 
     write: Callable[[Path, Simulated, Robots], None]
     usual: Robots
@@ -56,11 +49,7 @@ FORMATS = {
 
 
 def robots_for(name: str, asked: str | None) -> Robots:
-    """The robots that go into a format.
-
-    Args:
-        name: Name of the format.
-        asked: "mav", "ground" or "both"; None for the format's default.
+    """The robots that go into a format, as asked ("mav", "ground" or "both") or by default.
 
     Raises:
         InputError: The format cannot hold them.

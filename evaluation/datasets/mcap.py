@@ -1,14 +1,6 @@
 """A recording as a ROS 2 bag in MCAP, for `ros2 bag play`, Foxglove and rerun.
 
-recording/recording.mcap    messages in order of time
-recording/metadata.yaml     what rosbag2 keeps beside it
-
-/ROBOT/camera/image_raw/compressed  PNG          /ROBOT/camera/camera_info    nominal
-/ROBOT/camera/depth                 32FC1 [m]    /ROBOT/imu  /ROBOT/magnetic_field
-/tf_static    base_link to imu to camera_optical, nominal
-/tf           world to base_link: the truth
-/ROBOT/truth/odometry               of base_link, at 200 Hz
-/ROBOT/truth/camera                 of camera_optical, at the true time of each image
+docs/datasets.md lists the topics.
 """
 
 from __future__ import annotations

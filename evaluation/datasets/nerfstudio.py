@@ -1,11 +1,6 @@
 """One robot's images for Nerfstudio and other readers of its `transforms.json`.
 
-    transforms.json    true intrinsics and true poses, camera to world, in OpenGL's axes
-    images/            every tenth image
-    depths/            the ground robot's measured depth, 16 bit, millimetres, 0 is missing
-    points.ply         true points in the images' colours, as a start for splats
-
-OpenGL's camera looks along -z with y up. In Nerfstudio pixel centres are at halves.
+Poses are in OpenGL's axes: the camera looks along -z with y up. Pixel centres are at halves.
 """
 
 from __future__ import annotations
@@ -22,10 +17,9 @@ from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
 from airground.io.ply import write_ply
 from evaluation.datasets.simulated import Simulated, copy_images
-from evaluation.datasets.views import View, choose_views
+from evaluation.datasets.views import PIXEL_CENTRE, View, choose_views
 from sim.robots.motion import Robot
 
-PIXEL_CENTRE = 0.5
 MM_PER_M = 1000.0
 T_CAMERA_OPENGL = SE3(np.diag([1.0, -1.0, -1.0]), np.zeros(3))
 

@@ -22,15 +22,7 @@ MAX_SEEDS = 100_000
 
 
 class World(Part):
-    """One recording of a dataset.
-
-    Attributes:
-        scene: Name or file of the scene.
-        name: Name of the scene.
-        digest: SHA-256 of the scene's contents.
-        seed: Seed of the heap, the flight and the noise.
-        part: Part of the dataset.
-    """
+    """One recording of a dataset: name or file of the scene, its name, SHA-256 of its contents."""
 
     scene: str
     name: str
@@ -45,14 +37,7 @@ class World(Part):
 
 
 class Plan(Part):
-    """All that determines the contents of a dataset.
-
-    Attributes:
-        airground: Version of this program.
-        sensors: Name of the sensor preset.
-        duration_s: Duration of each recording [s]; the scenes' own if None.
-        worlds: The recordings.
-    """
+    """All that determines the contents of a dataset; without duration, the scenes' own are used."""
 
     airground: str = __version__
     sensors: str

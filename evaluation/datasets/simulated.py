@@ -23,13 +23,7 @@ from sim.robots.robot_motion import RobotMotion
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """What both robots sensed, and the truth.
-
-    Attributes:
-        recording: The recording as the pipeline reads it.
-        truth: Its truth.
-        files: Files of its images.
-    """
+    """What both robots sensed, the truth, and the files of the images."""
 
     recording: Recording
     truth: Truth

@@ -1,11 +1,6 @@
-"""The ground robot as a TUM RGB-D folder (Sturm et al., IROS 2012).
+"""The ground robot as a TUM RGB-D folder (Sturm et al., IROS 2012); docs/datasets.md lists it.
 
-rgb.txt depth.txt rgb/ depth/    16-bit depth, 5000 per metre, 0 is missing
-associations.txt                 colour and depth in pairs, as their associate.py writes
-accelerometer.txt                in a Kinect's axes
-groundtruth.txt                  the colour camera in the world, at the stamp of each image
-calibration.yaml imu0/ mag0/     which TUM's own folders lack: the nominal calibration, the
-                                 gyro and the magnetometer
+TUM's own folders have no calibration, gyro and magnetometer.
 """
 
 from __future__ import annotations

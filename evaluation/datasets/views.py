@@ -20,6 +20,8 @@ from sim.robots.motion import Robot
 EVERY = 10
 """Every tenth image is chosen: three per second, as many as reconstruction from images needs."""
 POINTS = 20_000
+PIXEL_CENTRE = 0.5
+"""Centre of the upper left pixel in COLMAP and Nerfstudio [px]."""
 GREY = 128
 """Colour of points that no image shows."""
 NEAR = 1e-3
@@ -41,15 +43,7 @@ class Seen:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """One image with its true pose.
-
-    Attributes:
-        robot: The robot that took it.
-        index: Index among all images of that robot.
-        file: Its file in the recording.
-        T_world_camera: True pose.
-        seen: True points in it.
-    """
+    """One image with its true pose, its index among all images of its robot, and points in it."""
 
     robot: Robot
     index: int
@@ -60,12 +54,7 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class Views:
-    """Images, and true points in the colours of the first image that sees them.
-
-    Attributes:
-        views: Robot by robot, in order of time.
-        cloud: All points, in the world.
-    """
+    """Images robot by robot, and true points in the colours of the first image that sees them."""
 
     views: list[View]
     cloud: PointCloud

@@ -67,6 +67,12 @@ def milliseconds(value: float | None) -> str:
     return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:.2f}"
 
 
+def markdown_table(titles: Sequence[object], rows: Sequence[Sequence[object]]) -> list[str]:
+    """Lines of a table in Markdown."""
+    lines = (titles, ["---"] * len(titles), *rows)
+    return ["| " + " | ".join(map(str, line)) + " |" for line in lines]
+
+
 def print_table(
     table: TextTable,
     title: str = "",

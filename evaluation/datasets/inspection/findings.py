@@ -23,14 +23,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One line of the table.
-
-    Attributes:
-        part: Part of the dataset: "mav", "ground", or "" for all of it.
-        subject: What was inspected.
-        found: What was found, in words and numbers.
-        verdict: What that means.
-    """
+    """One line of the table; `part` is "mav", "ground", or "" for all of the dataset."""
 
     part: str
     subject: str
@@ -68,15 +61,8 @@ LONGEST_GAP_S = {"images": 0.5, "IMU": 0.05, "magnetometer": 0.5, "true poses": 
 
 @dataclass(frozen=True)
 class Rhythm:
-    """Regularity of one stream of stamps.
-
-    Attributes:
-        count: Number of stamps.
-        rate_hz: Rate by the median step.
-        missing: Number of samples left out at that rate.
-        longest_gap_s: The longest step.
-        jitter_ms: Standard deviation of the steps that leave nothing out.
-    """
+    """Regularity of one stream of stamps: rate by the median step, samples missing at that rate,
+    and as jitter the standard deviation of the steps that leave nothing out."""
 
     count: int
     rate_hz: float

@@ -35,10 +35,6 @@ DEPTH_SAMPLES = 10
 def inspect_dataset(path: Path, calibration_file: Path | None = None) -> tuple[str, list[Finding]]:
     """Inspect a dataset; what keeps it from being read is a finding, too.
 
-    Args:
-        path: The folder.
-        calibration_file: Camera calibration of a plain folder.
-
     Returns:
         Its layout ("airground", "dataset" of many, "euroc" or "tum"), and the findings.
 
@@ -68,10 +64,8 @@ def _many(path: Path) -> list[Finding]:
     there = {str(file.parent.relative_to(path)) for file in path.glob(f"*/*/{HEADER}")}
     found = f"{len(there & planned)} of {len(planned)} planned"
     findings = [Finding("", "recordings", found)]
-    for name in sorted(planned - there):
-        findings.append(Finding(name, "recording", "is missing", Verdict.WRONG))
-    for name in sorted(there - planned):
-        findings.append(Finding(name, "recording", "was not planned", Verdict.WRONG))
+    for names, defect in ((planned - there, "is missing"), (there - planned, "was not planned")):
+        findings += [Finding(n, "recording", defect, Verdict.WRONG) for n in sorted(names)]
     for name in sorted(there & planned):
         findings += [replace(one, part=f"{name} {one.part}") for one in _ours(path / name)]
     return findings
@@ -140,7 +134,6 @@ def _camera(part: str, recording: RobotRecording) -> Finding:
 
 
 def _depth(part: str, recording: RobotRecording) -> Finding:
-    """Depth in a few images."""
     last = len(recording.camera_stamps) - 1
     known, middle = [], []
     for index in np.unique(np.linspace(0, last, DEPTH_SAMPLES).astype(int)):

@@ -70,12 +70,7 @@ ELSEWHERE = Fit(np.full(2, np.inf), np.nan)
 
 
 class Comparison:
-    """Compares two images at poses that are turned a little.
-
-    Args:
-        first, second: The images; the first needs depth.
-        camera: Intrinsics of both.
-    """
+    """Compares two images of one camera at poses turned a little; the first needs depth."""
 
     def __init__(self, first: Posed, second: Posed, camera: PinholeCamera) -> None:
         self._smooth = {

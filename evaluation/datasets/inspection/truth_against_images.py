@@ -14,9 +14,8 @@ from airground.core.se3 import SE3
 from airground.io.robot_recording import RobotRecording
 from evaluation.datasets.inspection.findings import Finding, Verdict
 from evaluation.datasets.inspection.photometric import SHIFT_PX, Posed, fits
+from evaluation.table.tracked_share import TruePose
 from sim.recording.truth import Truth
-
-TruePose = Callable[[int], SE3 | None]
 
 PAIRS = 12
 APART = 8

@@ -49,12 +49,7 @@ class Located:
 
 
 def located_by_appearance(given: Given, detector: cv2.Feature2D) -> Answer:
-    """Match the MAV's image with each ground view, and estimate the pose from all matches.
-
-    Args:
-        given: Input with views.
-        detector: Detector of features in a grey image; descriptors are compared by L2 distance.
-    """
+    """Match the MAV's image with each ground view, and estimate the pose from all matches."""
     if given.aerial_view is None or not given.ground_views:
         return Answer(None, "no image of the ground robot looks at what the MAV sees")
     matches = matches_of(given.aerial_view, given.ground_views, detector)
@@ -157,15 +152,7 @@ _ROWS, _COLUMNS = 256, 2048  # so many products stay in the cache
 
 
 def clear_matches(aerial: NDArray[np.float32], ground: NDArray[np.float32]) -> NDArray[np.int64]:
-    """Features whose best match is clearly better than the second.
-
-    Args:
-        aerial: (N, D) descriptors.
-        ground: (M, D) descriptors.
-
-    Returns:
-        (K, 2) indices into both, in the order of the first.
-    """
+    """(K, 2) indices of descriptors (N, D) and (M, D) whose best match is clearly the best."""
     if len(aerial) == 0 or len(ground) < 2:
         return np.empty((0, 2), np.int64)
     ground_squared = (ground**2).sum(axis=1)

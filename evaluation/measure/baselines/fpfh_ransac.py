@@ -79,15 +79,10 @@ def ransac(
     possible: Callable[[NDArray], NDArray[np.bool_]],
     rng: np.random.Generator,
 ) -> SE3 | None:
-    """The motion that brings most source points near their target points.
+    """T_target_source that brings most source points near their target points (N, 3) [m].
 
-    Args:
-        source, target: (N, 3) matched points [m].
-        possible: Whether each of rotations (B, 3, 3) is possible.
-        rng: Randomness of the triples.
-
-    Returns:
-        T_target_source fitted to its inliers, None where no triple gives a possible one.
+    It is fitted to its inliers; None where no triple of points gives a motion with a `possible`
+    rotation, of an array (B, 3, 3).
     """
     triples = rng.integers(0, len(source), (SAMPLES, 3))
     alike = _edges(source[triples]), _edges(target[triples])

@@ -40,12 +40,9 @@ def answer_at(given: Given, maps: HeightMapPair, position: NDArray) -> Answer:
 
 
 def lowest_cost(given: Given, cost: str, min_relief_m: float) -> Answer:
-    """The position of lowest cost in the search region (Eq. 3), always claimed.
+    """The position of lowest cost ("zmssd" or "ncc") in the search region (Eq. 3), always claimed.
 
-    Args:
-        given: The sighting.
-        cost: "zmssd" or "ncc".
-        min_relief_m: Least standard deviation of both maps' heights in the correlation [m].
+    `min_relief_m` is the least standard deviation of both maps' heights in the correlation.
     """
     maps = height_maps(given, cost=cost, min_relief_m=min_relief_m)
     if maps is None:

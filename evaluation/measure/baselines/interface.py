@@ -66,12 +66,7 @@ class Given:
 
 @dataclass(frozen=True)
 class Answer:
-    """A baseline's estimate of the MAV's pose.
-
-    Attributes:
-        T_ground_mav: Best estimate, None if there is none.
-        refusal: Reason why it is not claimed; empty if it is claimed.
-    """
+    """A baseline's estimate of the MAV's pose, and the reason why it is not claimed, if any."""
 
     T_ground_mav: SE3 | None
     refusal: str = ""

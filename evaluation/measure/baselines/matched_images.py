@@ -52,11 +52,7 @@ def match_images(
 ) -> MatchedImages | None:
     """Match one sighting's image by ASIFT; None where no ground view looks at the surface.
 
-    Args:
-        recording: Source of the images.
-        ground_poses: Stamp and pose of the ground robot's tracked images.
-        sighting: The MAV's surface and the ground map.
-        prior: Approximate T_ground_mav, which selects the ground views.
+    `prior` is an approximate T_ground_mav, which selects the ground views.
     """
     aerial = aerial_view(recording, sighting)
     views = GroundViews(recording, ground_poses).nearest(sighting, prior)

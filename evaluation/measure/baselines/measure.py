@@ -38,15 +38,9 @@ def add_baselines(
 ) -> None:
     """Write one answer of every baseline for some of the refinement trials.
 
-    Args:
-        out: Takes rows of the stage "baseline", with the numbers of the refinement trials; the
-            noisy prior is the start of that trial.
-        recording: Source of the images.
-        truth: Truth for errors and priors.
-        config: Search region and thresholds.
-        maps: Sightings and tracked images.
-        seed: Seeds of the recording and the flight.
-        counts: Number of refinement trials, and how many of them are used here.
+    Rows have the numbers of these trials; the noisy prior is the start of that trial. `seed` holds
+    the seeds of the recording and the flight; `counts` the number of refinement trials, and how
+    many of them are used here.
     """
     chosen = trial_sightings(len(maps.sightings), counts[0])
     ground_views = GroundViews(recording, maps.tracked["ground"].front_end.live_poses())

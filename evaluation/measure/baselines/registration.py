@@ -32,8 +32,11 @@ def searched_ground(given: Given) -> NDArray[np.float64]:
 
 def thinned(points: NDArray, voxel_m: float) -> NDArray[np.float64]:
     """(M, 3) the mean of the points (N, 3) in each cube [m]; the same on any number of threads."""
-    cloud = small_gicp.voxelgrid_sampling(np.asarray(points, np.float64), voxel_m, num_threads=1)
-    return np.array(cloud.points()[:, :3])
+    return np.array(_sampled(points, voxel_m).points()[:, :3])
+
+
+def _sampled(points: NDArray, voxel_m: float) -> small_gicp.PointCloud:
+    return small_gicp.voxelgrid_sampling(np.asarray(points, np.float64), voxel_m, num_threads=1)
 
 
 def settled_by_icp(given: Given, start: SE3) -> Answer:
@@ -43,14 +46,8 @@ def settled_by_icp(given: Given, start: SE3) -> Answer:
     search region, with the rotation that gravity and the magnetometers give.
     """
     refinement = given.config.refinement
-    aerial = small_gicp.voxelgrid_sampling(
-        given.sighting.surface.cloud_mav.points.astype(np.float64),
-        refinement.voxel_m,
-        num_threads=1,
-    )
-    ground = small_gicp.voxelgrid_sampling(
-        searched_ground(given), refinement.voxel_m, num_threads=1
-    )
+    aerial = _sampled(given.sighting.surface.cloud_mav.points, refinement.voxel_m)
+    ground = _sampled(searched_ground(given), refinement.voxel_m)
     tree = small_gicp.KdTree(ground, num_threads=1)
     small_gicp.estimate_normals(ground, tree, num_threads=1)
     motion = start
@@ -73,12 +70,9 @@ def settled_by_icp(given: Given, start: SE3) -> Answer:
 
 
 def why_refused(given: Given, motion: SE3, share: float) -> str:
-    """Reason why a registration is not claimed; empty if it is.
+    """Reason why a registered T_ground_mav is not claimed; empty if it is.
 
-    Args:
-        given: Search region and thresholds.
-        motion: Registered T_ground_mav.
-        share: Share of the aerial points that lie on the ground map.
+    `share` is that of the aerial points that lie on the ground map.
     """
     least = given.config.localization.min_overlap
     if share < least:

@@ -35,23 +35,16 @@ def aerial_view(recording: Recording, sighting: Sighting) -> View:
 class GroundViews:
     """Selects the ground robot's images that show best what the MAV sees.
 
-    Attributes:
-        recording: Source of the images.
-        poses: Stamp and T_ground_camera of the tracked images, by the robot's own SLAM.
+    `poses` are stamp [ns] and T_ground_camera of the tracked images, by the robot's own SLAM.
     """
 
     recording: Recording
     poses: Sequence[tuple[int, SE3]]
 
     def nearest(self, sighting: Sighting, T_ground_mav: SE3) -> tuple[View, ...]:
-        """Earlier images with the most similar view of the aerial surface to the MAV's.
+        """Earlier images with the most similar view of the aerial surface to the MAV's, best first.
 
-        Args:
-            sighting: The surface and its time.
-            T_ground_mav: Approximate pose of the MAV, used for the selection only.
-
-        Returns:
-            The best first; fewer than `VIEWS` if no others see the surface.
+        Fewer than `VIEWS` if no others see the surface. An approximate pose of the MAV suffices.
         """
         points = T_ground_mav @ _sampled(sighting.surface.cloud_mav.points)
         mav = (T_ground_mav @ sighting.surface.T_mav_camera).translation

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from airground.core.belief import Belief, CostMap, HeightMap
 from airground.core.events import BeliefUpdated, CostMapComputed, HeightMapsMade
@@ -80,25 +82,15 @@ class Localization:
         columns, rows = cost_map.costs.shape
         verdict = f"spread {belief.spread_m:.2f} m" if belief.converged else "position refused"
         parts = {
-            "particles": rr.Points2D(
-                on_costs(belief.particles[:, :2], cost_map),
-                colors=[rgb(PARTICLES)],
-                radii=rr.Radius.ui_points(2.0),
-                draw_order=20,
+            "particles": _dots(
+                on_costs(belief.particles[:, :2], cost_map), rgb(PARTICLES), 2.0, draw_order=20
             ),
             "covariance": _lines([on_costs(ellipse, cost_map)], WHITE, draw_order=30),
-            "estimate": rr.Points2D(
-                on_costs(belief.estimate[None, :2], cost_map),
-                colors=[WHITE],
-                radii=rr.Radius.ui_points(1.0),
-                draw_order=31,
+            "estimate": _dots(
+                on_costs(belief.estimate[None, :2], cost_map), WHITE, 1.0, draw_order=31
             ),
-            "verdict": rr.Points2D(
-                [[columns / 2, 0.88 * rows]],
-                colors=[WHITE],
-                radii=rr.Radius.ui_points(0.5),
-                labels=[verdict],
-                show_labels=True,
+            "verdict": _dots(
+                [[columns / 2, 0.88 * rows]], WHITE, 0.5, labels=[verdict], show_labels=True
             ),
         }
         for name, drawn in parts.items():
@@ -113,6 +105,12 @@ class Localization:
         arms = CROSS_PX * np.array([[[-1, 0], [1, 0]], [[0, -1], [0, 1]]], np.float32)
         cross = _lines(list(middle + arms), TRUTH_COLOUR, draw_order=40)
         self._stream.log(stamp_ns, TRUE_POSITION, cross)
+
+
+def _dots(
+    places: ArrayLike, colour: tuple[int, int, int], radius_pt: float, **more: Any
+) -> rr.Points2D:
+    return rr.Points2D(places, colors=[colour], radii=rr.Radius.ui_points(radius_pt), **more)
 
 
 def _lines(

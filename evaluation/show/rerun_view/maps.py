@@ -66,7 +66,9 @@ class Maps:
         assert pose.T_map_camera is not None
         first.add(image, pose.T_map_camera)
         if self._ground_pace.due(stamp_ns):
-            self._stream.log(stamp_ns, "ground/map", self._points(first.cloud(), GROUND_COLOUR))
+            self._stream.log(
+                stamp_ns, "ground/map", self._points(first.voxels.cloud(), GROUND_COLOUR)
+            )
 
     def _draw_ground(self, seen: Seen, stamp_ns: int) -> None:
         self._first = None
@@ -116,7 +118,7 @@ class FirstKeyframes:
 
     def __init__(self, camera: PinholeCamera, voxel_m: float) -> None:
         self._rays = camera.rays()[::FIRST_STRIDE_PX, ::FIRST_STRIDE_PX].reshape(-1, 3)
-        self._voxels = VoxelMap(voxel_m)
+        self.voxels = VoxelMap(voxel_m)
 
     def add(self, image: GroundImage, T_ground_camera: SE3) -> None:
         """Add a keyframe."""
@@ -124,11 +126,7 @@ class FirstKeyframes:
         colours = image.colour[::FIRST_STRIDE_PX, ::FIRST_STRIDE_PX].reshape(-1, 3)
         known = np.isfinite(depth)
         points = T_ground_camera @ (self._rays[known] * depth[known, None])
-        self._voxels.add(points, colours[known])
-
-    def cloud(self) -> PointCloud:
-        """All points."""
-        return self._voxels.cloud()
+        self.voxels.add(points, colours[known])
 
 
 def thinned(cloud: PointCloud, voxel_m: float) -> PointCloud:
