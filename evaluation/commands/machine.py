@@ -51,13 +51,15 @@ class Bench(SensorOption, SeedOption, Verb):
         from evaluation.bench.run import run_benchmark
         from evaluation.setup.output import check_free
         from evaluation.setup.progress import announce, step
+        from sim.scene import load_scene
 
         names = checked_names([name for name in self.rows.split(",") if name])
         seconds = in_range("--seconds-a-row", self.seconds_a_row, low=0.0, high=3600)
         if self.out is not None:
             check_free(self.out)
         parts = self._parts(names)
-        expected_s = work_s(self._recorded_s() * RENDER_S_PER_S, self.workers())
+        recorded_s = 0.0 if self.recording is not None else load_scene(SCENE).duration_s
+        expected_s = work_s(recorded_s * RENDER_S_PER_S, self.workers())
         expected_s += PLAY_S + parts * seconds
         cores = "1 core" if self.workers() == 1 else f"1 and {self.workers()} cores"
         announce(f"times {len(names)} rows on {cores}", expected_s)
@@ -86,12 +88,6 @@ class Bench(SensorOption, SeedOption, Verb):
         lanes = len({1, self.workers()})
         rows = sum(name in BY_NAME for name in names)
         return lanes + rows + (LIVE in names) + (len(CURVES) if self.curves else 0)
-
-    def _recorded_s(self) -> float:
-        """Length of the recording that must be made first [s]."""
-        from sim.scene import load_scene
-
-        return 0.0 if self.recording is not None else load_scene(SCENE).duration_s
 
     def _record(self, path: Path) -> Path:
         from sim.recording.recorder import record

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,9 +15,8 @@ from evaluation.commands.estimates import RUN_S_PER_S, START_S, recorded
 from evaluation.commands.options import OutOption, PipelineOptions, SeedOption, Shown, Verb
 
 if TYPE_CHECKING:
-    from airground.core.cloud import Source
-    from airground.core.messages import RobotCalibration
     from airground.io.recording import Recording
+    from airground.io.robot_recording import Pair
     from evaluation.judge.summary import Summary
     from evaluation.measure.showcase import Showcase
     from evaluation.run.drops import DropList
@@ -102,18 +101,20 @@ class RerunOptions:
         self,
         folder: Path,
         name: str,
-        calibrations: Mapping[Source, RobotCalibration],
+        recording: Pair,
         truth: Truth | None,
-        level: RerunLevel = "stages",
+        level: RerunLevel,
     ) -> Iterator[list[Onlooker]]:
         """The onlookers that draw a run into a folder; none where it was not asked for."""
         if not self.draws:
             yield []
             return
+        from airground.core.cloud import Source
         from evaluation.show.rerun_view.run_view import RUN_FILE, RunView
 
         with ExitStack() as stack:
             viewer = stack.enter_context(_viewer()) if self.rerun_live else None
+            calibrations = {robot: recording.of(robot).calibration for robot in Source}
             view = RunView(folder / RUN_FILE, name, calibrations, truth, level, viewer)
             stack.callback(view.close)
             yield [view]
@@ -148,7 +149,6 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
                 )
 
     def _run_simulated(self, path: Path) -> None:
-        from airground.core.cloud import Source
         from evaluation.measure.close_up import CloseUp
         from evaluation.run.drops import DropList, nothing_dropped
         from evaluation.run.recording import run_recording
@@ -166,9 +166,8 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
             seconds = recording.duration_s
             announce(f"runs {recorded(path, seconds)}", START_S + seconds * RUN_S_PER_S)
             close_up = CloseUp(recording, truth, setup) if self.draws else None
-            calibrations = {robot: recording.of(robot).calibration for robot in Source}
             name = recording.path.name
-            with self.watching(folder, name, calibrations, truth, level) as onlookers:
+            with self.watching(folder, name, recording, truth, level) as onlookers:
                 if close_up is not None:
                     onlookers.append(close_up)
                 result = run_recording(recording, truth, setup, seed, drops, onlookers, apart=True)
@@ -200,8 +199,7 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
             seconds = max(pair.mav.duration_s, pair.ground.duration_s)
             name = f"{mav.name}, {ground.name}"
             announce(f"runs {recorded(name, seconds)}", START_S + seconds * RUN_S_PER_S)
-            calibrations = {robot: pair.of(robot).calibration for robot in Source}
-            with self.watching(folder, name, calibrations, None, level) as onlookers:
+            with self.watching(folder, name, pair, None, level) as onlookers:
                 result = run_pair(pair, setup, seed, onlookers)
             summary = write_pair(folder, pair, setup, result)
             write_config(setup.config, folder / "config.toml")

@@ -101,15 +101,11 @@ def print_sweep(
         )
         for at in measured
     ]
+    # A screen is narrow.
+    titles = [name.replace(".", ".\n") for name in names]
+    titles += [metric.title.replace(" after", "\nafter") for metric in SWEPT.values()]
     print_table(
-        # A screen is narrow.
-        TextTable(
-            (
-                *(name.replace(".", ".\n") for name in names),
-                *(m.title.replace(" after", "\nafter") for m in SWEPT.values()),
-            ),
-            tuple(rows),
-        ),
+        TextTable(tuple(titles), tuple(rows)),
         _conditions(plan),
         "shares or medians with 95 % intervals; failures count as failures",
         console=console,

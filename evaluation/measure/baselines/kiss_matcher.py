@@ -42,6 +42,7 @@ def kiss_matcher_icp(given: Given) -> Answer:
     aerial = thinned(given.sighting.surface.cloud_mav.points, VOXEL_M)
     ground = thinned(searched_ground(given), VOXEL_M)
     above_aerial, above_ground = _above(aerial), _above(ground)
+    _bind_to_one_thread()
     matcher = _matcher()
     solution = matcher.estimate(
         list((aerial - above_aerial).astype(np.float32)),
@@ -57,11 +58,6 @@ def kiss_matcher_icp(given: Given) -> Answer:
 
 
 def _matcher() -> KISSMatcher:
-    _bind_to_one_thread()
-    return _unbound_matcher()
-
-
-def _unbound_matcher() -> KISSMatcher:
     from kiss_matcher import KISSMatcher, KISSMatcherConfig
 
     settings = KISSMatcherConfig(voxel_size=VOXEL_M, use_voxel_sampling=False, use_quatro=True)
@@ -80,7 +76,7 @@ def _bind_to_one_thread() -> None:
     try:
         for pid, usable in cores.items():
             os.sched_setaffinity(pid, {min(usable)})
-        _unbound_matcher().estimate(cloud, cloud)
+        _matcher().estimate(cloud, cloud)
     finally:
         for pid, usable in cores.items():
             os.sched_setaffinity(pid, usable)

@@ -46,7 +46,8 @@ class GroundViews:
 
         Fewer than `VIEWS` if no others see the surface. An approximate pose of the MAV suffices.
         """
-        points = T_ground_mav @ _sampled(sighting.surface.cloud_mav.points)
+        every = max(1, len(sighting.surface.cloud_mav) // SAMPLED_POINTS)
+        points = T_ground_mav @ sighting.surface.cloud_mav.points[::every]
         mav = (T_ground_mav @ sighting.surface.T_mav_camera).translation
         camera = self.recording.ground.calibration.camera
         rated = [
@@ -74,11 +75,6 @@ class GroundViews:
         image = self.recording.ground.image_at(stamp_ns)
         grey = np.asarray(cv2.cvtColor(image.colour, cv2.COLOR_RGB2GRAY), np.uint8)
         return View(stamp_ns, self.recording.ground.calibration.camera, pose, grey, image.depth)
-
-
-def _sampled(points: NDArray) -> NDArray:
-    """At most `SAMPLED_POINTS` of the points, evenly over their order."""
-    return points[:: max(1, len(points) // SAMPLED_POINTS)]
 
 
 def _likeness(points: NDArray, mav: NDArray, camera: PinholeCamera, pose: SE3) -> float:

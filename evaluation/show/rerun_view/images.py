@@ -34,7 +34,6 @@ from evaluation.show.rerun_view.sensor_stream import (
     SensorStream,
     camera_frame,
     image_frame,
-    paces,
 )
 from evaluation.table.truth_errors import depth_error
 from sim.recording.truth import Truth
@@ -63,7 +62,7 @@ class Images:
         self, stream: SensorStream, level: Level, calibrations: Mapping[Source, RobotCalibration]
     ) -> None:
         self._stream, self._level = stream, level
-        self._pace = paces(level.image_hz)
+        self._pace = {robot: Pace(level.image_hz) for robot in Source}
         for robot, calibration in calibrations.items():
             name = ROBOT[robot]
             image, corners = f"{name}/camera/image", f"{name}/camera/image/corners"

@@ -139,11 +139,6 @@ class Pace:
         return True
 
 
-def paces(hz: float) -> dict[Source, Pace]:
-    """A pace for each robot."""
-    return {robot: Pace(hz) for robot in Source}
-
-
 def rgb(colour: str) -> tuple[int, int, int]:
     """A colour such as "#35C46A" as the viewer reads it, each part from 0 to 255."""
     red, green, blue = np.rint(255 * np.array(to_rgb(colour))).astype(int).tolist()

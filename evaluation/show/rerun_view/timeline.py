@@ -22,7 +22,7 @@ from airground.core.events import (
 from airground.core.se3 import SE3
 from evaluation.run.onlooker import STAGE_OF, Seen
 from evaluation.show.figures.style import SERIES
-from evaluation.show.rerun_view.sensor_stream import ROBOT, TRUTH, Level, SensorStream, paces, rgb
+from evaluation.show.rerun_view.sensor_stream import ROBOT, TRUTH, Level, Pace, SensorStream, rgb
 from evaluation.table.truth_errors import BothPoses, pose_error
 from sim.recording.truth import Truth
 
@@ -56,7 +56,7 @@ class Curves:
 
     def __init__(self, stream: SensorStream, level: Level, truth: Truth | None) -> None:
         self._stream, self._truth = stream, truth
-        self._pace = paces(level.pose_hz)
+        self._pace = {robot: Pace(level.pose_hz) for robot in Source}
         self._poses: dict[Source, tuple[int, SE3]] = {}
         self._T_ground_mav: SE3 | None = None
         self._styled: set[str] = set()
