@@ -8,7 +8,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sim.appearance import print_marks as marks
-from sim.appearance.sheet import Colour, Sheet
+from sim.appearance.sheet import Colour, Sheet, fixed_point
 from sim.geometry.noise import Image, octave_noise, smooth_noise
 
 _CONCRETE: Colour = (154, 151, 145)
@@ -133,8 +133,7 @@ def _spots(sheet: Sheet, count: int, radius_m: tuple[float, float], depth: float
         rng = sheet.rng
         radius = rng.uniform(*radius_m) * rng.random() ** 0.7 * sheet.px_per_m + 4
         x, y = rng.uniform(0, 1, 2) * sheet.shape[::-1]
-        part = sheet.window(x, y, 1.8 * radius)
-        x, y = x - max(0, int(x - 1.8 * radius)), y - max(0, int(y - 1.8 * radius))
+        part, x, y = sheet.window(x, y, 1.8 * radius)
         rows, columns = (np.arange(n, dtype=np.float32) for n in part.shape)
         distance = np.hypot((columns[None] - x) * rng.uniform(0.7, 1.3), rows[:, None] - y) / radius
         distance += 0.25 * octave_noise(part.shape, max(radius * 0.8, 8), 3, rng, 0.6)
@@ -157,7 +156,7 @@ def _arcs(sheet: Sheet, count: int, length_m: tuple[float, float], depth: float)
             points = rng.uniform(0, 1, 2) * sheet.shape[::-1] + steps.cumsum(0)
             thick = int(rng.choice([1, 1, 1, 2, 3, 5]))
             value = int(rng.integers(60, 255))
-            cv2.polylines(layer, [_fixed(points)], False, value, thick, cv2.LINE_AA, 3)
+            cv2.polylines(layer, [fixed_point(points)], False, value, thick, cv2.LINE_AA, 3)
         sheet.blend(tone, layer * np.float32(depth / 255))
 
 
@@ -174,7 +173,7 @@ def _cracks(sheet: Sheet, count: int) -> None:
         place, angle, length, thick = seeds.pop()
         turns = angle + np.cumsum(rng.normal(0, 0.28, length))
         points = place + np.cumsum(step * np.stack([np.cos(turns), np.sin(turns)], 1), 0)
-        cv2.polylines(layer, [_fixed(points)], False, 255, thick, cv2.LINE_AA, 3)
+        cv2.polylines(layer, [fixed_point(points)], False, 255, thick, cv2.LINE_AA, 3)
         if length > 40:
             for k in rng.integers(5, length - 5, 2):
                 fork = turns[k] + rng.choice([-1, 1]) * rng.uniform(0.5, 1.2)
@@ -184,18 +183,14 @@ def _cracks(sheet: Sheet, count: int) -> None:
 
 def _joints(sheet: Sheet, size_m: tuple[float, float]) -> None:
     """Saw cuts that divide the slab: a dark line each."""
-    height, width = sheet.shape
     half = max(1, round(0.0025 * sheet.px_per_m))
+    dark = np.float32(0.4)
     for k in range(1, int(size_m[0] // 2.7) + 1):
         x = round((k * 2.7 - 1.1) * sheet.px_per_m)
-        _darken_strip(sheet, slice(0, height), slice(x - half, x + half))
+        sheet.pixels[:, x - half : x + half] *= dark
     for k in range(1, int(size_m[1] // 2.7) + 1):
         y = round((k * 2.7 - 0.4) * sheet.px_per_m)
-        _darken_strip(sheet, slice(y - half, y + half), slice(0, width))
-
-
-def _darken_strip(sheet: Sheet, rows: slice, columns: slice) -> None:
-    sheet.pixels[rows, columns] *= np.float32(0.4)
+        sheet.pixels[y - half : y + half] *= dark
 
 
 def _tape_and_paint(sheet: Sheet, count: int) -> None:
@@ -238,10 +233,9 @@ def _litter(sheet: Sheet, count: int) -> None:
         outline = (
             np.stack([np.cos(angle) * rng.uniform(0.3, 1), np.sin(angle)], 1) * radius[:, None]
         )
-        part = sheet.window(x, y, size + 4)
-        x, y = x - max(0, int(x - size - 4)), y - max(0, int(y - size - 4))
+        part, x, y = sheet.window(x, y, size + 4)
         scrap = np.zeros(part.shape, np.uint8)
-        cv2.fillPoly(scrap, [_fixed(outline + np.array([x, y]))], 255, cv2.LINE_AA, 3)
+        cv2.fillPoly(scrap, [fixed_point(outline + np.array([x, y]))], 255, cv2.LINE_AA, 3)
         shadow = cv2.GaussianBlur(np.roll(scrap, (1, 1), (0, 1)), (0, 0), 1.0)
         part.darken(1 - shadow * np.float32(0.4 / 255))
         tone = rng.uniform(0.45, 1.15)
@@ -266,15 +260,8 @@ def _stamp(
     turn_deg: float,
 ) -> None:  # fmt: skip
     """Paint a mask, worn through here and there."""
-    reach = float(np.hypot(*mark.shape)) / 2 + 3
-    part = sheet.window(x, y, reach)
+    part, x, y = sheet.window(x, y, float(np.hypot(*mark.shape)) / 2 + 3)
     layer = np.zeros(part.shape, np.uint8)
-    x, y = x - max(0, int(x - reach)), y - max(0, int(y - reach))
     marks.stamp(layer, mark, x, y, turn_deg)
     worn = np.clip(cover - 0.16 * octave_noise(part.shape, 24, 1, sheet.rng, 0.9), 0, 1)
     part.blend(colour, layer * worn * np.float32(1 / 255))
-
-
-def _fixed(points: NDArray) -> NDArray[np.int32]:
-    """Points in eighths of a pixel, as cv2 wants for smooth lines."""
-    return np.round(points * 8).astype(np.int32)

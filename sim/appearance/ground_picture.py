@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sim.appearance.sheet import Colour
+from sim.appearance.sheet import Colour, fixed_point
 from sim.geometry.noise import Image, octave_noise
 
 _SOILS: tuple[Colour, ...] = ((124, 102, 78), (166, 146, 116), (98, 84, 66))
@@ -94,11 +94,9 @@ def _pebbles(
     tones = rng.uniform(0.72, 1.12, count)
     kinds = rng.integers(len(_STONES), size=count)
     shift = 0.35 * radii[:, None, None] * sun
-    shadows, cores = (
-        _fixed(outline - shift),
-        _fixed(places[:, None] + shift + 0.55 * (outline - places[:, None])),
-    )
-    bodies = _fixed(outline)
+    shadows = fixed_point(outline - shift)
+    cores = fixed_point(places[:, None] + shift + 0.55 * (outline - places[:, None]))
+    bodies = fixed_point(outline)
     for i in range(count):
         colour = np.array(_STONES[kinds[i]]) * tones[i]
         cv2.fillConvexPoly(canvas, shadows[i], (52, 44, 36), cv2.LINE_AA, 3)
@@ -124,7 +122,7 @@ def _grass(
     bend = lean[:, None] + rng.normal(0, 0.35, len(root))[:, None] * np.arange(4)
     steps = length[:, None, None] / 4 * np.stack([np.cos(bend), np.sin(bend)], -1)
     blades = np.concatenate([root[:, None], root[:, None] + steps.cumsum(1)], axis=1)
-    fixed = _fixed(blades)
+    fixed = fixed_point(blades)
     layer = rng.integers(0, 12, len(root))
     for k in range(12):
         tone = 0.5 + 0.05 * k
@@ -148,14 +146,14 @@ def _leaves(
         outline = np.concatenate([np.stack([along, side], 1), np.stack([along, -side], 1)[::-1]])
         shape = outline @ rotation.T + place
         colour = np.array(_LEAVES[rng.integers(len(_LEAVES))]) * rng.uniform(0.75, 1.2)
-        cv2.fillPoly(canvas, [_fixed(shape + 2)], (58, 48, 38), cv2.LINE_AA, 3)
-        cv2.fillPoly(canvas, [_fixed(shape)], tuple(np.minimum(colour, 235)), cv2.LINE_AA, 3)
+        cv2.fillPoly(canvas, [fixed_point(shape + 2)], (58, 48, 38), cv2.LINE_AA, 3)
+        cv2.fillPoly(canvas, [fixed_point(shape)], tuple(np.minimum(colour, 235)), cv2.LINE_AA, 3)
         rib = np.array([[-length, 0], [length, 0]]) @ rotation.T + place
-        cv2.polylines(canvas, [_fixed(rib)], False, tuple(colour * 0.7), 1, cv2.LINE_AA, 3)
+        cv2.polylines(canvas, [fixed_point(rib)], False, tuple(colour * 0.7), 1, cv2.LINE_AA, 3)
         if rng.random() < 0.25:
             bends = angle + rng.normal(0, 0.25, 6).cumsum()
             twig = place + np.cumsum(np.stack([np.cos(bends), np.sin(bends)], 1), 0) * length
-            cv2.polylines(canvas, [_fixed(twig)], False, (70, 54, 40), 2, cv2.LINE_AA, 3)
+            cv2.polylines(canvas, [fixed_point(twig)], False, (70, 54, 40), 2, cv2.LINE_AA, 3)
 
 
 def paint_rock(nodes: NDArray, diameter_m: float, rng: np.random.Generator) -> Image:
@@ -207,8 +205,3 @@ def _interpolate(lattice: NDArray, places: NDArray) -> NDArray:
         d = lattice[i0, j1, k1] * (1 - u) + lattice[i1, j1, k1] * u
         out[n] = (a * (1 - v) + b * v) * (1 - w) + (c * (1 - v) + d * v) * w
     return out
-
-
-def _fixed(points: NDArray) -> NDArray[np.int32]:
-    """Points in eighths of a pixel, as cv2 wants for smooth lines."""
-    return np.round(points * 8).astype(np.int32)

@@ -28,18 +28,8 @@ CUBE_FACES: tuple[tuple[tuple[int, int, int], ...], ...] = (
 FACE_LIGHT_CELLS = 12
 
 
-def add_glowing_material(spec: mujoco.MjSpec, name: str, texture: str) -> None:
-    """A material that shows its texture as it is: the light is already in it."""
-    material = spec.add_material(
-        name=name, emission=1, specular=0, shininess=0, reflectance=0, rgba=[1, 1, 1, 1]
-    )
-    textures = list(material.textures)
-    textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = texture
-    material.textures = textures
-
-
 def add_picture(spec: mujoco.MjSpec, name: str, pixels: NDArray[np.uint8], cube: bool) -> None:
-    """Add a texture and a material of the same name.
+    """Add a texture and a material of the same name that glows: the light is already in it.
 
     Args:
         pixels: (H, W, 3); for a cube, six squares stacked in the order of CUBE_FACES.
@@ -48,7 +38,12 @@ def add_picture(spec: mujoco.MjSpec, name: str, pixels: NDArray[np.uint8], cube:
     height, width = pixels.shape[:2]
     texture = spec.add_texture(name=name, type=kind, width=width, height=height, nchannel=3)
     texture.data = pixels.tobytes()
-    add_glowing_material(spec, name, name)
+    material = spec.add_material(
+        name=name, emission=1, specular=0, shininess=0, reflectance=0, rgba=[1, 1, 1, 1]
+    )
+    textures = list(material.textures)
+    textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
+    material.textures = textures
 
 
 def paint_boxes(

@@ -40,12 +40,13 @@ class Sheet:
         """Paint `colour` where `cover` (H, W), 0 to 1, says."""
         _blend(self.pixels, np.array(colour, np.float32), cover.astype(np.float32, copy=False))
 
-    def window(self, x: float, y: float, reach_px: float) -> Sheet:
-        """The part within `reach_px` of (x, y), sharing pixels and generator."""
+    def window(self, x: float, y: float, reach_px: float) -> tuple[Sheet, float, float]:
+        """The part within `reach_px` of (x, y), sharing pixels and generator; (x, y) in it."""
         height, width = self.shape
         left, right = int(max(0, x - reach_px)), int(min(width, x + reach_px + 1))
         top, bottom = int(max(0, y - reach_px)), int(min(height, y + reach_px + 1))
-        return Sheet(self.pixels[top:bottom, left:right], self.px_per_m, self.rng)
+        part = Sheet(self.pixels[top:bottom, left:right], self.px_per_m, self.rng)
+        return part, x - left, y - top
 
     def crease(
         self, start: tuple[float, float], end: tuple[float, float], depth: float, width_px: int = 1
@@ -77,6 +78,11 @@ def _blend(pixels: NDArray, colour: NDArray, cover: NDArray) -> None:
             if f != 0:
                 for c in range(3):
                     pixels[i, j, c] += (colour[c] - pixels[i, j, c]) * f
+
+
+def fixed_point(points: NDArray) -> NDArray[np.int32]:
+    """Points in eighths of a pixel, as cv2 needs them for smooth lines."""
+    return np.round(points * 8).astype(np.int32)
 
 
 def faded(pixels: NDArray, contrast: float) -> NDArray:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.appearance import print_marks as marks
-from sim.appearance.sheet import Colour, Sheet
+from sim.appearance.sheet import Colour, Sheet, fixed_point
 from sim.geometry.noise import (
     cloud_bank,
     crop,
@@ -62,7 +62,7 @@ def tape(
     if min(part.shape) < 2:
         return
     mask = np.zeros(part.shape, np.uint8)
-    cv2.fillPoly(mask, [np.round((corners - low) * 8).astype(np.int32)], 255, cv2.LINE_AA, 3)
+    cv2.fillPoly(mask, [fixed_point(corners - low)], 255, cv2.LINE_AA, 3)
     lengthwise = 1 if abs(along[0]) > abs(along[1]) else 0
     streaks = rng.standard_normal(part.shape[1 - lengthwise]).astype(np.float32)
     streaks = np.expand_dims(streaks, lengthwise)
@@ -105,9 +105,7 @@ def _glue(sheet: Sheet, ink: NDArray[np.uint8], paper: Colour, colour: Colour) -
     rng = sheet.rng
     x, y = sheet.shape[1] * rng.uniform(0.22, 0.78), sheet.shape[0] * rng.uniform(0.25, 0.75)
     turn = float(rng.normal(0, 5) + rng.choice([0, 0, 90, 180]))
-    reach = float(np.hypot(*ink.shape)) / 2 + 6
-    part = sheet.window(x, y, reach)
-    x, y = x - max(0, int(x - reach)), y - max(0, int(y - reach))
+    part, x, y = sheet.window(x, y, float(np.hypot(*ink.shape)) / 2 + 6)
     paper_mask, ink_mask = np.zeros(part.shape, np.uint8), np.zeros(part.shape, np.uint8)
     marks.stamp(paper_mask, np.full(ink.shape, 255, np.uint8), x, y, turn)
     marks.stamp(ink_mask, ink, x, y, turn)
@@ -154,9 +152,7 @@ def _stain(sheet: Sheet) -> None:
     rng = sheet.rng
     radius = rng.uniform(0.02, 0.09) * sheet.px_per_m
     x, y = rng.uniform(0, 1, 2) * sheet.shape[::-1]
-    reach = 1.7 * radius
-    part = sheet.window(x, y, reach)
-    x, y = x - max(0, int(x - reach)), y - max(0, int(y - reach))
+    part, x, y = sheet.window(x, y, 1.7 * radius)
     rows, columns = (np.arange(n, dtype=np.float32) for n in part.shape)
     across = (columns - np.float32(x)) * np.float32(rng.uniform(0.75, 1.5) / radius)
     down = (rows - np.float32(y)) / np.float32(radius)

@@ -63,22 +63,19 @@ def make_heap(scene: Scene, rng: np.random.Generator) -> tuple[Box, ...]:
     if rubble is None:
         return ()
     makes, sizes = _draw_boxes(rubble, rng)
-    lane = lane_points(scene)
-    heap = _Heap(scene, sizes, lane, rng)
-    everything = np.arange(len(sizes))
-    heap.throw(everything, rng)
-    heap.settle(walled=True)
-    heap.settle(walled=False)
-    for _ in range(ROUNDS):
-        bad = heap.offenders()
-        if not len(bad):
-            break
+    heap = _Heap(scene, sizes, rng)
+    bad = np.arange(len(sizes))
+    for _ in range(1 + ROUNDS):
         heap.throw(bad, rng)
         heap.settle(walled=True)
         heap.settle(walled=False)
-    while len(bad := heap.offenders()):
+        bad = heap.offenders()
+        if not len(bad):
+            break
+    while len(bad):
         heap.park(bad)
         heap.settle(walled=False)
+        bad = heap.offenders()
     kept = heap.remaining()
     if len(kept) < 0.9 * rubble.boxes:
         raise InputError(
@@ -133,13 +130,11 @@ def _draw_boxes(rubble: Rubble, rng: np.random.Generator) -> tuple[NDArray, NDAr
 class _Heap:
     """The physics of a heap while it settles."""
 
-    def __init__(
-        self, scene: Scene, sizes: NDArray, lane: NDArray, rng: np.random.Generator
-    ) -> None:
+    def __init__(self, scene: Scene, sizes: NDArray, rng: np.random.Generator) -> None:
         assert scene.rubble is not None
         self.rubble = scene.rubble
         self.sizes = sizes
-        self.lane = lane
+        self.lane = lane_points(scene)
         self.half_room = np.array(scene.room.size_m) / 2
         self.model = _settling_model(scene, sizes)
         self.data = mujoco.MjData(self.model)

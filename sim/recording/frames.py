@@ -148,12 +148,9 @@ class FrameMaker:
     ) -> NDArray[np.uint8]:
         sensor = self._sensors[robot]
         half_ns = round(sensor.noise.exposure_s * 0.5e9)
-        T_start_end = self._moved(robot, time_ns - half_ns, time_ns + half_ns)
+        start = self._motion.camera_pose(robot, time_ns - half_ns)
+        T_start_end = start.inverse() @ self._motion.camera_pose(robot, time_ns + half_ns)
         return sensor.expose(sharp, depth, T_start_end, time_ns * 1e-9, rng)
-
-    def _moved(self, robot: Robot, start_ns: int, end_ns: int) -> SE3:
-        start = self._motion.camera_pose(robot, start_ns)
-        return start.inverse() @ self._motion.camera_pose(robot, end_ns)
 
     def _depth_units(self, depth: NDArray[np.float32]) -> NDArray[np.uint16]:
         """PNG values by the true scale; what is missing or too far for 16 bits is 0."""

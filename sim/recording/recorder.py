@@ -106,7 +106,13 @@ def record(
             tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".partial", dir=out.parent)
         )
         temporary.chmod(0o755)
-        _fill(temporary, Flight(scene, seed, flight, preset, duration_s), workers, progress)
+        what = Flight(scene, seed, flight, preset, duration_s)
+        header, plan = write_all_but_images(temporary, what)
+        _store_model(plan, what)
+        digests = _render(plan, workers, progress)
+        plan.model.unlink()
+        plan.edges.unlink()
+        recording_writer.finish(temporary, header, digests)
         temporary.rename(out)
     except OSError as error:
         if error.errno == errno.ENOSPC:
@@ -116,16 +122,6 @@ def record(
         if temporary is not None:
             shutil.rmtree(temporary, ignore_errors=True)
     return out
-
-
-def _fill(root: Path, flight: Flight, workers: int, progress: Progress | None) -> None:
-    """Write a whole recording into an empty folder."""
-    header, plan = write_all_but_images(root, flight)
-    _store_model(plan, flight)
-    digests = _render(plan, workers, progress)
-    plan.model.unlink()
-    plan.edges.unlink()
-    recording_writer.finish(root, header, digests)
 
 
 @contextmanager

@@ -14,9 +14,8 @@ from sim.robots.quadrotor import (
     MOUNTING,
     PHYSICS_STEP_S,
     REST_HEIGHT_M,
-    GeometricController,
-    Setpoint,
     quadrotor_model,
+    rotor_thrusts,
 )
 from sim.robots.robot_motion import RobotMotion
 from sim.scene import MavPath
@@ -108,15 +107,15 @@ def fly(plan: FlightPlan, step_s: float, field: MagneticField) -> RobotMotion:
     data = mujoco.MjData(model)
     mujoco.mj_step(model, data, nstep=round(SETTLE_S / PHYSICS_STEP_S))
     substeps = round(step_s / PHYSICS_STEP_S)
-    controller = GeometricController()
     mav = model.body("mav").id
     count = len(plan.throttle)
     states, sensors = np.empty((count, 13)), np.empty((count, 6))
     rotations = np.empty((count, 3, 3))
     for index in range(count):
         mujoco.mju_quat2Mat(rotations[index].reshape(9), data.qpos[3:])
-        command = controller.rotor_thrusts(
-            _setpoint(plan, index), data.qpos[:3], rotations[index], data.qvel[:3], data.qvel[3:]
+        target, heading = plan.position[:, index], plan.heading[:2, index, 0]
+        command = rotor_thrusts(
+            target, heading, data.qpos[:3], rotations[index], data.qvel[:3], data.qvel[3:]
         )
         data.ctrl[:] = plan.throttle[index] * command
         data.xfrc_applied[mav, :3] = plan.gust[index]
@@ -137,15 +136,4 @@ def fly(plan: FlightPlan, step_s: float, field: MagneticField) -> RobotMotion:
         angular_velocities_body=states[:, 10:],
         specific_force_imu=sensors[:, 3:],
         gyro_imu=sensors[:, :3],
-    )
-
-
-def _setpoint(plan: FlightPlan, index: int) -> Setpoint:
-    position, velocity, acceleration = plan.position[:, index]
-    return Setpoint(
-        position,
-        velocity,
-        acceleration,
-        heading=float(plan.heading[0, index, 0]),
-        heading_rate=float(plan.heading[1, index, 0]),
     )

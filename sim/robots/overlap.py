@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from airground.errors import InputError
 from sim.geometry.surface import RayCaster
+from sim.robots.flight import RISE_S
+from sim.robots.ground_robot import CAMERA_FORWARD_M, REST_S
 from sim.robots.paths import cut_headings, heading_path, planar_path
 from sim.scene import GroundPath, Scene, load_scene
 from sim.world.world import World, build_world
@@ -22,9 +24,7 @@ CELL_M = 0.04
 GROUND_RANGE_M = 4.0
 FLIGHT_STEP_M = 0.7
 _DRIVE_STEP_S = 0.5
-_RISE_S = 3.0
-_REST_S, _REACH_S = 1.0, 1.5  # a heading_path's start, and what its corners' rounding adds
-_GROUND_CAMERA_FORWARD_M = 0.15
+_REACH_S = 1.5  # what the rounding of its corners adds to a heading_path
 # Focal length, columns and rows of a quarter of the ground camera's and an eighth of the MAV's
 # resolution (its footprint is twice as far away and its cells as large).
 _GROUND_IMAGE = (525 / 4, 160, 120)
@@ -87,7 +87,7 @@ def driven_path(world: World) -> GroundPath:
     sights = Sights.of(world, ground)
     stops = np.arange(0, scene.duration_s, _DRIVE_STEP_S)
     reached = np.array([np.median(sights.shares(stop)) for stop in stops])
-    moving = _REST_S + _REACH_S + _DRIVE_STEP_S
+    moving = REST_S + _REACH_S + _DRIVE_STEP_S
     least, most = reached[np.searchsorted(stops, moving)], reached[-1]
     if not least <= wanted <= most:
         raise InputError(
@@ -96,7 +96,7 @@ def driven_path(world: World) -> GroundPath:
         )
     stop_s = max(moving, float(stops[np.argmax(reached >= wanted)]))
     waypoints = np.array(ground.waypoints) * [1, 1, np.pi / 180]
-    driven_s = stop_s - _REST_S - _REACH_S
+    driven_s = stop_s - REST_S - _REACH_S
     cut = cut_headings(waypoints, ground.speed_mps, np.radians(ground.turn_dps), driven_s)
     kept = tuple((float(x), float(y), float(np.rad2deg(heading))) for x, y, heading in cut)
     return ground.model_copy(update={"waypoints": kept})
@@ -105,8 +105,8 @@ def driven_path(world: World) -> GroundPath:
 def _flight(scene: Scene) -> tuple[NDArray, NDArray]:
     """Times (K,) [s] and places (K, 2) [m] every 0.7 m of flight at full height."""
     mav = scene.mav
-    path = planar_path([mav.start, *mav.waypoints], mav.speed_mps, mav.takeoff_s + _RISE_S - 1.0)
-    times = np.arange(mav.takeoff_s + _RISE_S, scene.duration_s, 0.1)
+    path = planar_path([mav.start, *mav.waypoints], mav.speed_mps, mav.takeoff_s + RISE_S - 1.0)
+    times = np.arange(mav.takeoff_s + RISE_S, scene.duration_s, 0.1)
     places, velocities, _ = path.jet(times)
     travelled = np.cumsum(np.linalg.norm(velocities, axis=1)) * 0.1
     keep = np.searchsorted(travelled, np.arange(FLIGHT_STEP_M / 2, travelled[-1], FLIGHT_STEP_M))
@@ -118,7 +118,7 @@ def _first_seen(
 ) -> NDArray[np.float64]:
     """(X, Y) when the ground camera first saw each cell [s]; infinite where it never did."""
     waypoints = np.array(ground.waypoints) * [1, 1, np.pi / 180]
-    path = heading_path(waypoints, ground.speed_mps, np.radians(ground.turn_dps), _REST_S)
+    path = heading_path(waypoints, ground.speed_mps, np.radians(ground.turn_dps), REST_S)
     first = np.full(shape, np.inf)
     pitch = np.radians(ground.camera_pitch_deg)
     for time in np.arange(0, min(path.end_s, world.scene.duration_s), _DRIVE_STEP_S):
@@ -127,7 +127,7 @@ def _first_seen(
         place = np.array([x, y, float(world.floor_height(x, y)) + ground.camera_height_m])
         forward = np.cos(pitch) * ahead + [0, 0, -np.sin(pitch)]
         right = np.array([ahead[1], -ahead[0], 0.0])
-        place = place + _GROUND_CAMERA_FORWARD_M * ahead
+        place = place + CAMERA_FORWARD_M * ahead
         points = _cast(caster, place, right, forward, _GROUND_IMAGE, GROUND_RANGE_M)
         cells = _cells(points, world.scene, shape)
         first[cells[:, 0], cells[:, 1]] = np.minimum(first[cells[:, 0], cells[:, 1]], time)

@@ -7,8 +7,6 @@ opposite rotors. The controller is the geometric one on SE(3) of Lee, Leok and M
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +24,10 @@ FOOT_RADIUS_M = 0.01
 FOOT_BELOW_M = 0.10  # of a foot's centre below the body's origin
 REST_HEIGHT_M = FOOT_BELOW_M + FOOT_RADIUS_M
 PHYSICS_STEP_S = 0.0025
+# Gains of the controller on the errors of position [1/s^2] and velocity [1/s], and on those of
+# attitude and its rate, per inertia.
+STIFFNESS, DAMPING = 9.0, 5.0
+ATTITUDE_STIFFNESS, ATTITUDE_DAMPING = 150.0, 20.0
 
 # The camera looks straight down; its image's up (-y) is the body's forward (+x).
 MOUNTING = Mounting(
@@ -75,8 +77,7 @@ def quadrotor_model(x: float, y: float, floor: float, heading: float) -> mujoco.
             pos=[rotor_x, rotor_y, -FOOT_BELOW_M],
         )
     imu = MOUNTING.T_body_imu
-    x_, y_, z_, w_ = imu.quaternion_xyzw()
-    body.add_site(name="imu", pos=imu.translation, quat=[w_, x_, y_, z_])
+    body.add_site(name="imu", pos=imu.translation, quat=np.roll(imu.quaternion_xyzw(), 1))
     for name, kind in (
         ("gyro", mujoco.mjtSensor.mjSENS_GYRO),
         ("accelerometer", mujoco.mjtSensor.mjSENS_ACCELEROMETER),
@@ -102,70 +103,44 @@ def _add_rotor(
     motor.dynprm[0] = MOTOR_LAG_S
 
 
-@dataclass(frozen=True)
-class Setpoint:
-    """What the MAV is asked to do now.
+def rotor_thrusts(
+    target: NDArray, heading: NDArray,
+    position: NDArray, rotation: NDArray, velocity: NDArray, angular_velocity: NDArray,
+) -> NDArray[np.float64]:  # fmt: skip
+    """(4,) thrusts [N] that track a target by tilting the thrust (Lee et al., Eq. 12, 15, 16).
 
-    Attributes:
-        position, velocity, acceleration: (3,) in `world` [m, m/s, m/s^2].
-        heading: Heading of the body's x axis [rad].
-        heading_rate: Rate of the heading [rad/s].
+    Args:
+        target: (3, 3) wanted position, velocity, acceleration in `world` [m, m/s, m/s^2].
+        heading: (2,) wanted heading of the body's x axis [rad] and its rate [rad/s].
+        position: (3,) position in `world` [m].
+        rotation: (3, 3) body to world.
+        velocity: (3,) velocity in `world` [m/s].
+        angular_velocity: (3,) angular velocity in the body [rad/s].
     """
-
-    position: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    acceleration: NDArray[np.float64]
-    heading: float
-    heading_rate: float
-
-
-@dataclass(frozen=True)
-class GeometricController:
-    """Tracks position and heading by tilting the thrust (Lee et al., Eq. 12, 15, 16).
-
-    Attributes:
-        stiffness, damping: Gains on the position error [1/s^2], [1/s].
-        attitude_stiffness, attitude_damping: Gains on the attitude error, per inertia.
-    """
-
-    stiffness: float = 9.0
-    damping: float = 5.0
-    attitude_stiffness: float = 150.0
-    attitude_damping: float = 20.0
-
-    def rotor_thrusts(
-        self,
-        setpoint: Setpoint,
-        position: NDArray,
-        rotation: NDArray,
-        velocity: NDArray,
-        angular_velocity: NDArray,
-    ) -> NDArray[np.float64]:
-        """(4,) thrusts [N] for a state; velocity in `world`, angular velocity in the body."""
-        force = MASS_KG * (
-            self.stiffness * (setpoint.position - position)
-            + self.damping * (setpoint.velocity - velocity)
-            + setpoint.acceleration
-            - GRAVITY_WORLD
-        )
-        wanted = _attitude_for(force, setpoint.heading)
-        back = wanted.T @ rotation
-        tilt_error = 0.5 * np.array(
-            [back[2, 1] - back[1, 2], back[0, 2] - back[2, 0], back[1, 0] - back[0, 1]]
-        )
-        rate_error = angular_velocity - back.T[:, 2] * setpoint.heading_rate
-        spin = INERTIA * angular_velocity
-        torque = -INERTIA * (
-            self.attitude_stiffness * tilt_error + self.attitude_damping * rate_error
-        ) + np.array(
-            [
-                angular_velocity[1] * spin[2] - angular_velocity[2] * spin[1],
-                angular_velocity[2] * spin[0] - angular_velocity[0] * spin[2],
-                angular_velocity[0] * spin[1] - angular_velocity[1] * spin[0],
-            ]
-        )
-        wrench = np.array([force @ rotation[:, 2], *torque])
-        return np.clip(_UNMIXER @ wrench, 0.0, MAX_THRUST_N)
+    force = MASS_KG * (
+        STIFFNESS * (target[0] - position)
+        + DAMPING * (target[1] - velocity)
+        + target[2]
+        - GRAVITY_WORLD
+    )
+    wanted = _attitude_for(force, heading[0])
+    back = wanted.T @ rotation
+    tilt_error = 0.5 * np.array(
+        [back[2, 1] - back[1, 2], back[0, 2] - back[2, 0], back[1, 0] - back[0, 1]]
+    )
+    rate_error = angular_velocity - back.T[:, 2] * heading[1]
+    spin = INERTIA * angular_velocity
+    torque = -INERTIA * (
+        ATTITUDE_STIFFNESS * tilt_error + ATTITUDE_DAMPING * rate_error
+    ) + np.array(
+        [
+            angular_velocity[1] * spin[2] - angular_velocity[2] * spin[1],
+            angular_velocity[2] * spin[0] - angular_velocity[0] * spin[2],
+            angular_velocity[0] * spin[1] - angular_velocity[1] * spin[0],
+        ]
+    )
+    wrench = np.array([force @ rotation[:, 2], *torque])
+    return np.clip(_UNMIXER @ wrench, 0.0, MAX_THRUST_N)
 
 
 def _attitude_for(force: NDArray, heading: float) -> NDArray[np.float64]:
