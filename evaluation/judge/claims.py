@@ -110,6 +110,7 @@ class Localizations:
         return len(self.accepted)
 
     def only_accepted(self) -> Localizations:
+        """Those that claim a position."""
         kept = self.accepted
         return Localizations(
             self.error_m[kept], self.spread_m[kept], self.squared_mahalanobis[kept], kept[kept]

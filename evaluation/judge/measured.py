@@ -84,5 +84,4 @@ def flight_value(metric: Metric, values: list[float]) -> float:
 
 
 def headline(measured: Measured) -> dict[str, float]:
-    """The figure of every metric."""
     return {metric.name: figure(metric, measured.samples[metric.name]) for metric in WATCHED}

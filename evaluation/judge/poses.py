@@ -37,13 +37,11 @@ class PoseMetric:
     worst: Literal["largest", "smallest"] = "largest"
 
     def paper(self, robot: str) -> str:
-        """The paper's value for readers."""
         if self.name == "ate_se3_rmse_m":
             return METRICS[f"{robot}_trajectory"].paper
         return "7.7 m" if (self.name, robot) == ("path_m", "ground") else MISSING
 
     def text(self, value: float) -> str:
-        """A value for readers."""
         match self.unit:
             case "m":
                 return metres(value)
@@ -130,7 +128,6 @@ class SlamRobot(Part):
 
     @classmethod
     def of(cls, table: ResultTable, robot: str) -> SlamRobot:
-        """Sum up one robot of a table of one condition."""
         made = {}
         for metric in POSE_METRICS:
             found = read_poses(metric, robot, table)

@@ -64,7 +64,6 @@ def values(stage: str, metric: str) -> Take:
 
 
 def magnitudes(stage: str, metric: str) -> Take:
-    """The absolute values of one metric."""
     signed = values(stage, metric)
     return lambda table: signed(table).abs()
 

@@ -25,7 +25,6 @@ class Condition:
     variant: str = ""
 
     def parts(self) -> tuple[str, ...]:
-        """Its parts as text."""
         poses = {
             "slam": "poses from SLAM",
             "oracle exact": "exact poses",

@@ -88,7 +88,6 @@ def run(command: Callable[[], int | None], verbose: bool = False) -> int:
 
 
 def print_error(message: str) -> None:
-    """One line on stderr."""
     one_line = " ".join(message.split())
     print(f"airground: error: {one_line}", file=sys.stderr)
 

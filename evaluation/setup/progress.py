@@ -59,7 +59,6 @@ class Step:
             self.advance()
 
     def say(self, note: str) -> None:
-        """Name what is done now."""
         self.note = note
 
     def next(self, note: str) -> None:

@@ -32,6 +32,7 @@ class OracleErrors(Section):
     """White orientation noise per axis and frame [deg]."""
 
     def noise(self) -> PoseNoise:
+        """The same in metres and degrees."""
         return PoseNoise(
             drift_mav_m=self.drift_mav_cm / 100,
             drift_ground_m=self.drift_ground_cm / 100,

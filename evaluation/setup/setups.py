@@ -88,6 +88,7 @@ class Setup:
     given: Given = NOTHING
 
     def front_ends(self) -> dict[str, FrontEndName]:
+        """The front end of "mav" and of "ground"."""
         oracles = {"oracle": ROBOTS, "slam, exact mav": {"mav"}, "slam, exact ground": {"ground"}}
         way: dict[str, FrontEndName] = dict.fromkeys(ROBOTS, "slam")
         way |= dict.fromkeys(oracles.get(self.poses, set()), "oracle")

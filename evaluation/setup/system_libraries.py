@@ -47,7 +47,6 @@ SYSTEM_LIBRARIES = (
 
 
 def missing_libraries() -> list[SystemLibrary]:
-    """The libraries that the loader does not find."""
     return [library for library in SYSTEM_LIBRARIES if not library.present()]
 
 

@@ -76,6 +76,7 @@ class Oracle:
         """An oracle puts nothing off."""
 
     def trajectory(self) -> Trajectory | None:
+        """The poses as returned."""
         if not self._tracked:
             return None
         stamps, poses = zip(*self._tracked, strict=True)
@@ -85,6 +86,7 @@ class Oracle:
 def oracle_front_ends(
     recording: Recording, truth: Truth, noise: PoseNoise, rng: np.random.Generator
 ) -> FrontEnds:
+    """Oracles for both robots of a recording."""
     mav_rng, ground_rng = rng.spawn(2)
     mav_stamps, ground_stamps = recording.mav.camera_stamps, recording.ground.camera_stamps
     mav_path = np.array([truth.T_world_mav_camera(int(t)).translation for t in mav_stamps])

@@ -90,7 +90,6 @@ class FailuresMoved:
 
 
 def failures_moved(held: Against) -> FailuresMoved:
-    """Failures of one side only."""
     before, after = (
         {failure.key: failure for failure in failures(run.on(held.shared))}
         for run in (held.reference, held.run)

@@ -175,7 +175,6 @@ def _timing(primary: Drawn) -> Iterator[ReportFigure]:
 
 
 def _counts(drawn: list[Drawn], counts: list[int], what: str) -> str:
-    """Number of cases under each condition."""
     if len(set(counts)) == 1:
         listed = f"{counts[0]} {what}" + (" each" if len(counts) > 1 else "")
     else:
