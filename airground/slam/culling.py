@@ -34,11 +34,6 @@ class KeyframeCuller:
 
     Those of the window are never taken out, nor the first keyframe, and none that adjusting the
     whole map still needs for its inertial motion.
-
-    Attributes:
-        map, adjuster, recovery, path: Map and what depends on it, changed in place.
-        camera, T_rig_camera: The robot's camera.
-        parameters: The robot's section of the configuration.
     """
 
     map: SparseMap
@@ -51,11 +46,7 @@ class KeyframeCuller:
     _next: int = field(default=1, init=False)
 
     def cull(self, inertial: bool) -> None:
-        """Judge the keyframe that just left the window and, in turn, one of the older ones.
-
-        Args:
-            inertial: Whether the map is metric and gravity-aligned by the accelerometer.
-        """
+        """Judge the keyframe that just left the window and, in turn, one of the older ones."""
         # One keyframe stays beside the window: inertial motion leads from it.
         left = len(self.map.keyframes) - self.parameters.window - 2
         if left >= 1:
@@ -67,9 +58,7 @@ class KeyframeCuller:
 
     def _judge(self, keyframe: int, inertial: bool) -> bool:
         """Take a keyframe out if it may go; returns whether it did."""
-        if inertial and not self.adjuster.can_skip(keyframe):
-            return False
-        if not self.covered(keyframe):
+        if (inertial and not self.adjuster.can_skip(keyframe)) or not self.covered(keyframe):
             return False
         keyframes = self.map.keyframes
         before, gone, after = keyframes[keyframe - 1 : keyframe + 2]

@@ -26,13 +26,7 @@ def jumps(T_map_camera: SE3, expected: SE3, more_m: float = 0.0) -> bool:
 
 
 def surprising(T_map_camera: SE3, expected: SE3, unseen_s: float) -> bool:
-    """Whether a pose is not where the robot's motion would have carried it.
-
-    Args:
-        T_map_camera: Pose found.
-        expected: Predicted pose.
-        unseen_s: Time since the last image with a pose [s].
-    """
+    """Whether a pose is not where motion carries the robot in `unseen_s` without a pose [s]."""
     turn = rotation_angle(T_map_camera.rotation.T @ expected.rotation)
     return jumps(T_map_camera, expected, MAX_DRIFT_MPS * unseen_s) or turn > MAX_TURN_RAD
 

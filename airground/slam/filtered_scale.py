@@ -25,9 +25,6 @@ class FilteredScale:
     The map is scaled once, when the scale is known; later corrections would tear apart what
     was built on it.
 
-    Args:
-        slam: SLAM with the map, changed in place.
-
     Attributes:
         estimate: How well the scale is known; None before the first inertial motion.
         known: Whether poses may be given out.
@@ -43,11 +40,7 @@ class FilteredScale:
         self._first_ns = self._last_ns = 0
 
     def update(self, tracked: bool) -> bool:
-        """Take in the newest pose; returns whether the map was moved.
-
-        Args:
-            tracked: Whether the newest image gave a pose.
-        """
+        """Take in the newest image, which gave a pose or not; returns whether the map was moved."""
         slam = self._slam
         if self.known or not tracked or slam.stamp_ns is None:
             return False

@@ -20,11 +20,7 @@ and a turn by half the image leaves 0.3."""
 
 
 class ImageTurn:
-    """Follows the turn from image to image.
-
-    Args:
-        camera: Camera of the images.
-    """
+    """Follows the turn from image to image."""
 
     def __init__(self, camera: PinholeCamera) -> None:
         self._camera = camera
@@ -36,8 +32,7 @@ class ImageTurn:
     def follow(self, image: U8) -> F64 | None:
         """(2,) turn since the last image about the camera's x and y axes [rad]; None if unclear."""
         height, width = self._window.shape
-        shrunk = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
-        small = shrunk.astype(np.float32)
+        small = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA).astype(np.float32)
         last, self._last = self._last, small
         if last is None:
             return None
@@ -52,11 +47,7 @@ class ImageTurn:
     def rig_turn(self, image: U8, last_turn: F64, R_rig_camera: F64) -> F64:
         """(3, 3) turn of the rig to the next image; about the optical axis as last time.
 
-        Args:
-            image: (height, width) grey image.
-            last_turn: (3, 3) turn of the rig to the previous image; returned where the images are
-                not clear.
-            R_rig_camera: (3, 3) rotation of the camera in the rig.
+        Where the images are not clear it is `last_turn`, (3, 3), that to the previous image.
         """
         slide = self.follow(image)
         if slide is None:

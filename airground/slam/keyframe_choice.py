@@ -36,13 +36,7 @@ class News:
 
 @dataclass(eq=False)
 class KeyframeChoice:
-    """Chooses the images that stay.
-
-    Attributes:
-        map: Map with the keyframes so far.
-        camera, T_rig_camera: The robot's camera.
-        parameters: The robot's section of the configuration.
-    """
+    """Chooses the images that stay."""
 
     map: SparseMap
     camera: PinholeCamera
@@ -52,11 +46,7 @@ class KeyframeChoice:
     def wanted(self, tracker: FeatureTracker, state: RigState, stamp_ns: int, timed: bool) -> bool:
         """Whether the newest image shows enough that the last keyframe did not.
 
-        Args:
-            tracker: Corners in the newest image.
-            state: State of the rig at that image.
-            stamp_ns: Stamp of the image [ns].
-            timed: Whether a keyframe is due now and then, even if nothing is new.
+        With `timed`, a keyframe is also due now and then if nothing is new.
         """
         last, parameters = self.map.keyframes[-1], self.parameters
         if timed and (stamp_ns - last.stamp_ns) * 1e-9 >= parameters.keyframe_interval_s:
@@ -80,15 +70,7 @@ def what_is_new(
     R_last_here: F64,
     camera: PinholeCamera,
 ) -> News:
-    """Compare the newest image with the last keyframe.
-
-    Args:
-        sparse_map: Map of both images.
-        last: The last keyframe.
-        tracker: Corners in the newest image.
-        R_last_here: (3, 3) turn of the camera since the keyframe.
-        camera: Camera of both images.
-    """
+    """Compare the newest image with the last keyframe; the camera turned by (3, 3) meanwhile."""
     _, here, there = np.intersect1d(tracker.ids, last.ids, return_indices=True)
     moved = _turned(tracker.pixels[here], R_last_here, camera) - last.pixels[there]
     parallax = np.linalg.norm(moved, axis=1)

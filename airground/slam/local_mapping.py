@@ -36,10 +36,6 @@ class LocalMapper:
     """Extends the map by one keyframe at a time.
 
     Attributes:
-        map, tracker: Map and followed corners, changed in place.
-        adjuster: Bundle adjustment of the map.
-        camera, T_rig_camera: The robot's camera.
-        parameters: The robot's section of the configuration.
         max_depth_m: Largest depth that starts a point [m].
         found_old: Whether the newest keyframe found points again of keyframes older than the
             window.

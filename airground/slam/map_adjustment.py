@@ -51,10 +51,6 @@ class MapAdjuster:
     """Bundle adjustment over a sparse map.
 
     Attributes:
-        map: Map, changed in place.
-        camera: Camera of all keyframes.
-        T_rig_camera: Pose of the camera in the rig.
-        parameters: The robot's section of the configuration.
         inverse_depth_sigma: Standard deviation of measured inverse depth [1/m].
 
         motions: Inertial motion before each keyframe, by its index, where known.

@@ -126,10 +126,7 @@ class MotionModel:
     def coasted(self, before: RigState, prediction: Prediction, unseen_s: float) -> RigState:
         """The state at an image that shows nothing: a robot goes on for a while.
 
-        Args:
-            before: The state at the image before.
-            prediction: Prediction from that state.
-            unseen_s: Time since the last image with a pose [s].
+        The last image with a pose was `unseen_s` earlier [s].
         """
         state = prediction.state
         if unseen_s > MAX_COAST_S:

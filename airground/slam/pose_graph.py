@@ -43,11 +43,8 @@ def straighten(sparse_map: SparseMap, loop: Edge) -> None:
     """Move keyframes so that the loop closes; points go with the keyframe that saw them first.
 
     Neighbours in time, and keyframes that share points, keep their relative poses as well as
-    they can: the better, the more points they share. The first keyframe stays.
-
-    Args:
-        sparse_map: Map, changed in place; velocities turn with their keyframes.
-        loop: Measured relative pose that closes the loop.
+    they can: the better, the more points they share. The first keyframe stays; velocities turn
+    with their keyframes.
     """
     before = [keyframe.state.pose() for keyframe in sparse_map.keyframes]
     certain = Edge(loop.first, loop.second, loop.T_first_second, loop.points * LOOP_CERTAINTY**2)

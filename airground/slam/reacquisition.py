@@ -82,19 +82,7 @@ def find_again(
     window_px: int,
     levels: int,
 ) -> tuple[I64, F32]:
-    """Follow points from an old keyframe into an image.
-
-    Args:
-        sparse_map: Map with the keyframe.
-        keyframe: Index of the old keyframe.
-        ids: (n,) numbers of points that it saw, sorted.
-        image: (height, width) grey image.
-        start: (n, 2) expected pixels of the points in `image`.
-        window_px, levels: Patch size and pyramid levels as in `optical_flow.flow`.
-
-    Returns:
-        Numbers of the points that were found, and (m, 2) pixels in `image`.
-    """
+    """Follow points from the old keyframe of an index, as `find_in_keyframes` does."""
     old = sparse_map.keyframes[keyframe]
     order = np.argsort(old.ids)
     rows = order[np.searchsorted(old.ids, ids, sorter=order)]

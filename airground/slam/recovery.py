@@ -46,13 +46,7 @@ class Found:
 
 @dataclass(eq=False)
 class Recovery:
-    """Finds the pose of an image without that of the image before.
-
-    Attributes:
-        map: Map to relocalize in.
-        camera, T_rig_camera: The robot's camera.
-        parameters: The robot's section of the configuration.
-    """
+    """Finds the pose of an image in the map without that of the image before."""
 
     map: SparseMap
     camera: PinholeCamera
@@ -105,22 +99,16 @@ class Recovery:
         return None if found is None else self.near(image, found.fit.T_map_camera)
 
     def again(self, among: list[int], without: I64) -> Found | None:
-        """Look for the places of old keyframes in the newest one.
-
-        Args:
-            among: The old keyframes.
-            without: Numbers of points that do not count.
-        """
+        """Look for the places of old keyframes in the newest one; some points do not count."""
         newest = self.map.keyframes[-1]
         stamps = [self.map.keyframes[k].stamp_ns for k in among]
         alike = self._index.resembling(newest.stamp_ns, stamps)
         if not alike:
             return None
-        image = newest.image
-        found = self._index.find(image, self.camera, self._places, alike)
+        found = self._index.find(newest.image, self.camera, self._places, alike)
         if found is None:
             return None
-        return self.near(image, found.fit.T_map_camera, among=among, without=without)
+        return self.near(newest.image, found.fit.T_map_camera, among=among, without=without)
 
     def _places(self, ids: I64) -> F64:
         """(n, 3) positions of points, NaN where they have none."""

@@ -60,11 +60,7 @@ def _centred(state: RigState, calibration: RobotCalibration) -> RigState:
 
 
 class StandStill:
-    """Notices that a tracked robot stands still, so that its velocity and its biases are known.
-
-    Args:
-        calibration: Nominal calibration of the robot.
-    """
+    """Notices that a tracked robot stands still, so that its velocity and its biases are known."""
 
     def __init__(self, calibration: RobotCalibration) -> None:
         self._noise = calibration.imu
@@ -85,11 +81,7 @@ class StandStill:
 
 
 class RestStart:
-    """Waits beside a robot at rest until it begins to move.
-
-    Args:
-        calibration: Nominal calibration of the robot.
-    """
+    """Waits beside a robot at rest until it begins to move."""
 
     def __init__(self, calibration: RobotCalibration) -> None:
         self._calibration = calibration
@@ -136,13 +128,7 @@ class MovingStart:
 
 
 class TwoViewWait:
-    """Follows corners from one image until another sees enough of them from elsewhere.
-
-    Args:
-        calibration: Nominal calibration of the robot.
-        parameters: The robot's section of the configuration.
-        rng: Source of the samples of matches.
-    """
+    """Follows corners from one image until another sees enough of them from elsewhere."""
 
     def __init__(
         self, calibration: RobotCalibration, parameters: KeyframeSlam, rng: np.random.Generator

@@ -33,9 +33,6 @@ class TightScale:
     A map that began at rest is metric from the start, and only has to tell how well it knows
     its scale. One that began in motion is scaled and turned upright once both are known.
 
-    Args:
-        slam: SLAM with the map, changed in place.
-
     Attributes:
         estimate: How well the scale is known; None before the first alignment.
         known: Whether poses may be given out.
@@ -51,11 +48,7 @@ class TightScale:
         self._judged = 0
 
     def update(self, tracked: bool) -> bool:
-        """Look at new keyframes; returns whether the map was moved.
-
-        Args:
-            tracked: Whether the newest image gave a pose; here only keyframes matter.
-        """
+        """Look at new keyframes, `tracked` or not; returns whether the map was moved."""
         slam = self._slam
         count = slam.map.made
         if slam.motion.buffer is None:

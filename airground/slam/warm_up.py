@@ -29,9 +29,6 @@ def warm_up_slam(rng: np.random.Generator) -> None:
     """Track a camera that swings over a flat texture, as both robots would.
 
     The MAV begins once at rest and once in motion.
-
-    Args:
-        rng: Source of the texture and the samples.
     """
     texture = _texture(rng)
     noise = ImuNoise(1e-4, 1e-5, 1e-3, 1e-4)
