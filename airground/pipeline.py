@@ -49,18 +49,31 @@ class Mapping:
         self._north: dict[Source, float | None] = {Source.MAV: None, Source.GROUND: None}
         self._correction: Trajectory | None = None
         self.ground_map: GroundMap | FixedMap = GroundMap(ground.camera, config.ground_mapping)
-        self._mav_pose: TrackedPose | None = None
-        self._ground_pose: TrackedPose | None = None
+        self._poses: dict[Source, TrackedPose] = {}
 
     def take(self, frame: TrackedFrame) -> Iterator[Event]:
         """Take in one frame; those of both robots come in order of time."""
-        self._north[frame.robot] = frame.north_rad
+        robot, pose, stamp_ns = frame.robot, frame.pose, frame.stamp_ns
+        self._north[robot], self._poses[robot] = frame.north_rad, pose
+        if robot == Source.GROUND:
+            self.correct_ground(frame.trajectory)
+        if pose.T_map_camera is None:
+            if pose.tracking is Tracking.INITIALIZING:
+                yield Initializing(pose.stamp_ns, robot)
+            else:
+                yield TrackingLost(pose.stamp_ns, robot)
+            return
+        scale_sigma = None if pose.scale is None else pose.scale.sigma
+        tracked = (stamp_ns, pose.T_map_camera, pose.covariance, scale_sigma)
+        yield MavTracked(*tracked) if robot == Source.MAV else GroundTracked(*tracked)
+        if pose.corrected:
+            yield PosesCorrected(stamp_ns, robot)
         match frame.image:
-            case MavImage() as image:
-                yield from self._take_mav_image(image, frame.pose)
-            case GroundImage() as image:
-                self.correct_ground(frame.trajectory)
-                yield from self._take_ground_image(image, frame.pose)
+            case MavImage(image=image):
+                yield from self._dense.add(stamp_ns, image, pose.T_map_camera, pose.depth_range)
+            case GroundImage() as keyframe if self.ground_map.wants(pose.T_map_camera):
+                self.ground_map.add(keyframe, pose.T_map_camera)
+                yield GroundMapExtended(stamp_ns, self.ground_map.keyframes)
 
     def correct_ground(self, trajectory: Trajectory | None) -> None:
         """The ground robot now believes in these poses of its images; None changes nothing."""
@@ -87,7 +100,7 @@ class Mapping:
 
     def sight(self, surface: AerialSurface) -> Sighting | None:
         """Snapshot of both maps for a surface that was just cast; None while a robot is lost."""
-        mav, ground = self._mav_pose, self._ground_pose
+        mav, ground = self._poses.get(Source.MAV), self._poses.get(Source.GROUND)
         if mav is None or mav.T_map_camera is None or ground is None or ground.T_map_camera is None:
             return None
         return Sighting(
@@ -99,39 +112,6 @@ class Mapping:
             ground.T_map_camera,
             self.relative_heading(),
         )
-
-    def _take_mav_image(self, image: MavImage, pose: TrackedPose) -> Iterator[Event]:
-        self._mav_pose = pose
-        if pose.T_map_camera is None:
-            yield _no_pose(pose, Source.MAV)
-            return
-        yield MavTracked(image.stamp_ns, pose.T_map_camera, pose.covariance, _scale_sigma(pose))
-        if pose.corrected:
-            yield PosesCorrected(image.stamp_ns, Source.MAV)
-        yield from self._dense.add(image.stamp_ns, image.image, pose.T_map_camera, pose.depth_range)
-
-    def _take_ground_image(self, image: GroundImage, pose: TrackedPose) -> Iterator[Event]:
-        self._ground_pose = pose
-        if pose.T_map_camera is None:
-            yield _no_pose(pose, Source.GROUND)
-            return
-        yield GroundTracked(image.stamp_ns, pose.T_map_camera, pose.covariance, _scale_sigma(pose))
-        if pose.corrected:
-            yield PosesCorrected(image.stamp_ns, Source.GROUND)
-        if self.ground_map.wants(pose.T_map_camera):
-            self.ground_map.add(image, pose.T_map_camera)
-            yield GroundMapExtended(image.stamp_ns, self.ground_map.keyframes)
-
-
-def _no_pose(pose: TrackedPose, robot: Source) -> Event:
-    """What became of an image that got no pose."""
-    if pose.tracking is Tracking.INITIALIZING:
-        return Initializing(pose.stamp_ns, robot)
-    return TrackingLost(pose.stamp_ns, robot)
-
-
-def _scale_sigma(pose: TrackedPose) -> float | None:
-    return None if pose.scale is None else pose.scale.sigma
 
 
 class Pipeline:

@@ -86,13 +86,11 @@ class SE3:
     def quaternion_xyzw(self) -> F64:
         """(4,) unit quaternion in TUM's order, with w >= 0."""
         quaternion = Rotation.from_matrix(self.rotation).as_quat()
-        result: F64 = -quaternion if quaternion[3] < 0 else quaternion
-        return result
+        return -quaternion if quaternion[3] < 0 else quaternion
 
     def rotation_vector(self) -> F64:
         """(3,) axis times angle [rad]."""
-        result: F64 = Rotation.from_matrix(self.rotation).as_rotvec()
-        return result
+        return Rotation.from_matrix(self.rotation).as_rotvec()
 
     def angle(self) -> float:
         """Angle of the rotation [rad], in [0, pi] (angle-axis, as in Fig. 14)."""
@@ -176,8 +174,7 @@ def nearest_rotation(matrix: NDArray[Any]) -> F64:
     u, _, vt = np.linalg.svd(matrix)
     if np.linalg.det(u @ vt) < 0:
         u[:, 2] *= -1
-    result: F64 = u @ vt
-    return result
+    return u @ vt
 
 
 def _left_jacobian(phi: F64) -> F64:

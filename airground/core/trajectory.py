@@ -65,8 +65,7 @@ class Trajectory:
 
     def quaternions_xyzw(self) -> F64:
         """(N, 4) unit quaternions in TUM's order."""
-        result: F64 = Rotation.from_matrix(self.rotations).as_quat()
-        return result
+        return Rotation.from_matrix(self.rotations).as_quat()
 
     def path_m(self) -> float:
         """Length of the path [m]."""

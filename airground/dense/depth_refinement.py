@@ -56,8 +56,7 @@ def _speckles(plane: F32) -> Mask:
     scaled = np.where(np.isfinite(plane), plane * 16, -16).astype(np.int16)
     cleaned = scaled.copy()
     cv2.filterSpeckles(cleaned, -16, SPECKLE_PX, int(16 * SPECKLE_STEP_PLANES))
-    result: Mask = (cleaned == -16) & (scaled != -16)
-    return result
+    return (cleaned == -16) & (scaled != -16)
 
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)

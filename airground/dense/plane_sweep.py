@@ -1,10 +1,8 @@
 """The photometric cost of depth planes, one view after another (Sec. V).
 
-A view is first turned so that it looks the way the reference does. What is left between
-the two is a translation, under which a plane parallel to the image is only scaled and
-shifted: every row is read in order, without gathering. The view is kept at the full
-resolution, each pixel averaged over 2 x 2, so that a sample at any position has the blur
-of the halved reference, and interpolating it adds next to none.
+A view is first turned so that it looks the way the reference does. Then a plane parallel to the
+image is only scaled and shifted: every row is read in order. The view keeps the full resolution,
+each pixel averaged over 2 x 2: a sample at any position has the blur of the halved reference.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """How near and how far the scene before a view is (Sec. VIII-B).
 
-The paper reads it off the sparse map of the monocular SLAM. A front end need not have one
-here, and a map in progress lacks what just came into view, so points come from the images as
-well: corners of the reference tracked into its farther views and triangulated with the known
-poses. Both ranges are joined, so that neither cuts the scene short.
+The paper reads it off the sparse map of the monocular SLAM, which lacks what just came into view.
+So corners of the reference are tracked into its farthest view and triangulated as well, and both
+ranges are joined.
 """
 
 from __future__ import annotations
@@ -111,5 +110,4 @@ def _depths(
         plane = np.cross(centre / baseline, rays)
         off = np.abs(np.einsum("ij,ij->i", plane, others)) / np.linalg.norm(plane, axis=1)
     good = (parallax * camera.fx > MIN_PARALLAX_PX) & (off * camera.fx < MAX_EPIPOLAR_ERROR_PX)
-    result: F64 = depth[good & (depth > 0)]
-    return result
+    return depth[good & (depth > 0)]

@@ -1,8 +1,7 @@
 """Which frames make a depth map (Sec. VIII-B).
 
-A depth map compares its reference view with the views within 12 cm of it. Everything is
-decided as frames come in, from distances alone, and a hovering MAV makes neither views nor
-depth maps: a frame counts only once the camera has moved on.
+Everything is decided as frames come in, from distances alone. A hovering MAV makes neither views
+nor depth maps: a frame counts only once the camera has moved on.
 """
 
 from __future__ import annotations
@@ -67,12 +66,7 @@ class ViewBuffer:
 
 
 class ViewSet:
-    """The views of one depth map.
-
-    Attributes:
-        reference: Reference view of the depth map.
-        complete: Whether the camera has left the radius.
-    """
+    """The views of one depth map; `complete` once the camera has left the radius."""
 
     def __init__(self, reference: PosedImage, parameters: Parameters) -> None:
         self.reference = reference

@@ -1,11 +1,9 @@
 """The volume of interest of one surface, as voxels (Sec. V and VIII-B).
 
-The voxels are those of a camera frustum: pixels of a reference view by planes evenly
-spaced in depth. Against a gravity-aligned grid of the same 376 x 240 x 150 cells this
-wastes none outside the field of view, is finer on top of the heap than on the floor, as
-the images are, and makes casting the surface into the reference view a scan along columns.
-Even steps in depth, not in inverse depth: the error of a crossing is a share of the step,
-and most of what the MAV sees is at the far end.
+The voxels are those of a camera frustum: pixels of a reference view by planes evenly spaced in
+depth. Unlike in a gravity-aligned grid, none lies outside the field of view, and the surface is
+cast along columns. Even steps in depth, not in inverse depth: the error of a crossing is a share
+of the step, and most of what the MAV sees is at the far end.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
 """Keyframes of the ground robot, fused at their estimated poses (Sec. IV).
 
-Keyframes are fused in a truncated signed distance field, which averages the sensor's noise
-along its rays. Averaging points in cubes does not: at 4 m the noise of structured light is
-wider than a cube, and the highest of scattered points would enter the height map.
-
-When SLAM corrects poses, the map follows: keyframes are kept, and fused anew where they moved.
+A truncated signed distance field averages the sensor's noise along its rays. Averaging points in
+cubes does not: at 4 m the noise of structured light is wider than a cube, and the highest of
+scattered points would enter the height map. When SLAM corrects poses, keyframes are fused anew.
 """
 
 from __future__ import annotations

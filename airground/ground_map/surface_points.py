@@ -1,9 +1,8 @@
 """From the fused field to points: where it changes its sign between neighbouring voxels.
 
-The field lies in cubic blocks, as Open3D's voxel block grid has them. Its own extraction gives
-the same points in the order of a parallel hash map, another each time; here blocks come in the
-order of their places, so that nothing needs sorting afterwards. And it leaves a surface out that
-runs through voxels exactly.
+Open3D's own extraction gives the same points in the order of a parallel hash map, another each
+time, and leaves a surface out that runs through voxels exactly; here blocks come in the order of
+their places.
 """
 
 from __future__ import annotations

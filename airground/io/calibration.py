@@ -86,12 +86,7 @@ class ImuTable(Table):
     """[m/s^3/sqrt(Hz)]"""
 
     def noise(self) -> ImuNoise:
-        return ImuNoise(
-            self.gyro_noise_density,
-            self.gyro_bias_walk,
-            self.accelerometer_noise_density,
-            self.accelerometer_bias_walk,
-        )
+        return ImuNoise(**self.model_dump(exclude={"rate_hz"}))
 
 
 class MagnetometerTable(Table):

@@ -1,8 +1,7 @@
 """Lens distortion, removed from images as they are read.
 
-Every image becomes one of a pinhole camera of the same size, in which no pixel lies outside
-the original image (OpenCV's `getOptimalNewCameraMatrix` with alpha 0): a black rim would
-look like structure to a tracker. A lens without distortion leaves images as they are.
+Every image becomes one of a pinhole camera of the same size, in which no pixel lies outside the
+original image: a black rim would look like structure to a tracker.
 """
 
 from __future__ import annotations
@@ -55,13 +54,8 @@ class Undistortion:
             )
             self._maps = cv2.convertMaps(x, y, cv2.CV_16SC2)
             self._nearest, _ = cv2.convertMaps(x, y, cv2.CV_16SC2, nninterpolation=True)
-        self.camera = PinholeCamera(
-            *size,
-            fx=float(matrix[0, 0]),
-            fy=float(matrix[1, 1]),
-            cx=float(matrix[0, 2]),
-            cy=float(matrix[1, 2]),
-        )
+        fx, fy, cx, cy = (float(matrix[at]) for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
+        self.camera = PinholeCamera(*size, fx, fy, cx, cy)
 
     def image(self, image: U8) -> U8:
         """Grey (H, W) or colour (H, W, 3), interpolated."""

@@ -100,8 +100,7 @@ def upwards(imu: ImuSamples, imu_path: Path) -> F64:
         )
     start = imu.stamps_ns <= imu.stamps_ns[0] + round(START_S * 1e9)
     mean = imu.accelerometer[start].mean(axis=0)
-    result: F64 = mean / np.linalg.norm(mean)
-    return result
+    return mean / np.linalg.norm(mean)
 
 
 def check_up_in_camera(up_camera: F64, imu_path: Path) -> None:
@@ -152,11 +151,7 @@ def level_body(up_imu: F64, T_imu_camera: SE3) -> SE3:
     """T_body_imu of a body at the IMU: z up as given, x where the camera looks, levelled.
 
     Plain folders do not say how their sensors sit in a body with z up; where the camera
-    looks straight down, x is where the image's top points.
-
-    Args:
-        up_imu: (3,) unit vector, up in the IMU's axes.
-        T_imu_camera: Pose of the camera in the IMU's frame.
+    looks straight down, x is where the image's top points. `up_imu` (3,) is a unit vector.
     """
     _, y_camera, z_camera = T_imu_camera.rotation.T
     ahead = z_camera - y_camera

@@ -56,11 +56,7 @@ class Sender:
 
 
 class Receiver:
-    """The end that receives; bound to the loopback interface, at a port that is free.
-
-    Attributes:
-        address: Address that a sender connects to.
-    """
+    """The end that receives; bound to a free port of the loopback interface, at `address`."""
 
     def __init__(self) -> None:
         self._socket: zmq.Socket[bytes] = zmq.Context.instance().socket(zmq.DEALER)

@@ -26,6 +26,8 @@ from airground.tracking import TrackedFrame
 JPEG = "jpeg"
 TYPES = ("|u1", "<f4", "<f8", "<i8")
 """Element types that an array may have."""
+PATH = ("path_stamps_ns", "path_rotations", "path_translations")
+"""Names of a trajectory's arrays."""
 
 Parts = list[bytes]
 
@@ -110,18 +112,12 @@ def _frame(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> TrackedFr
 def _trajectory_arrays(trajectory: Trajectory | None) -> dict[str, NDArray[Any]]:
     if trajectory is None:
         return {}
-    return {
-        "path_stamps_ns": trajectory.stamps_ns,
-        "path_rotations": trajectory.rotations,
-        "path_translations": trajectory.translations,
-    }
+    arrays = (trajectory.stamps_ns, trajectory.rotations, trajectory.translations)
+    return dict(zip(PATH, arrays, strict=True))
 
 
 def _trajectory(arrays: dict[str, NDArray[Any]]) -> Trajectory | None:
-    if "path_stamps_ns" not in arrays:
-        return None
-    names = ("path_stamps_ns", "path_rotations", "path_translations")
-    return Trajectory(*(arrays[name] for name in names))
+    return Trajectory(*(arrays[name] for name in PATH)) if PATH[0] in arrays else None
 
 
 def _message(header: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Parts:

@@ -30,11 +30,9 @@ def mean_height(heights: F32) -> tuple[float, int]:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def about_mean(heights: F32, margin: int) -> tuple[F32, F32, float]:
-    """Heights with NaN in holes as heights about their mean, 0 in holes; the mask; the mean.
+    """Heights (nx, ny) [m] with NaN in holes as heights about their mean, 0 in holes; mask; mean.
 
-    Args:
-        heights: (nx, ny) heights [m], NaN in holes.
-        margin: Width of the empty border [cells].
+    The first two have an empty border, `margin` cells wide.
     """
     nx, ny = heights.shape
     mean, _ = mean_height(heights)

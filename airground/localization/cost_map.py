@@ -110,15 +110,13 @@ class OffsetSearch:
         return costs_of(sums, aerial.filled_cells, config).reshape(self.shape)
 
     def _transform(self, patch: Masked) -> tuple[C64, C64, C64]:
-        images = (patch.mask, patch.heights, patch.heights**2)
-        mask, heights, squares = (self._spectrum(image) for image in images)
-        return mask, heights, squares
+        spectrum = self._spectrum
+        return spectrum(patch.mask), spectrum(patch.heights), spectrum(patch.heights**2)
 
     def _spectrum(self, image: F32) -> C64:
         """`rfft2` of the image with zeros around, not spent on the rows that are all zeros."""
         rows, columns = self._fft_shape
-        result: C64 = fft.fft(fft.rfft(image, columns, axis=1), rows, axis=0, overwrite_x=True)
-        return result
+        return fft.fft(fft.rfft(image, columns, axis=1), rows, axis=0, overwrite_x=True)
 
     def _correlate(self, product: C64, out: F32) -> None:
         """`irfft2` of a product of spectra, not spent on rows that are no offset.

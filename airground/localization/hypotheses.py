@@ -74,11 +74,7 @@ def search_headings(
     """Every position for headings all around, coarse to fine.
 
     Headings 4 degrees apart are searched first; between the most promising of them all
-    are. Costs are exact for each heading that the volume holds.
-
-    Args:
-        aerial: Height map around the camera for heading 0.
-        ground, centre, config: Ground map, centre and parameters as for `search_positions`.
+    are. Costs are exact for each heading that the volume holds. The aerial map is for heading 0.
     """
     cells = _cells(aerial)
     reach = (

@@ -40,14 +40,11 @@ def filled_cells(heights: F32, first_x: int, first_y: int) -> tuple[F32, float]:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def in_fours(heights: F32) -> tuple[F32, float]:
-    """Ground heights about their mean (nx + 4, ny + 4, 4), each with those beside and behind.
-
-    Args:
-        heights: (nx, ny) heights [m], NaN in holes.
+    """Ground heights (nx, ny) [m] about their mean, each with those beside and behind.
 
     Returns:
-        Each cell, the next of its row, and the two behind these in the next row; NaN in holes and
-        in `MARGIN` cells around. And the mean [m].
+        (nx + 4, ny + 4, 4): each cell, the next of its row, and the two behind these in the next
+        row; NaN in holes and in `MARGIN` cells around. And the mean [m].
     """
     mean, _ = mean_height(heights)
     nx, ny = heights.shape
