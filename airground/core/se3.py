@@ -86,11 +86,13 @@ class SE3:
     def quaternion_xyzw(self) -> F64:
         """(4,) unit quaternion in TUM's order, with w >= 0."""
         quaternion = Rotation.from_matrix(self.rotation).as_quat()
-        return -quaternion if quaternion[3] < 0 else quaternion
+        result: F64 = -quaternion if quaternion[3] < 0 else quaternion
+        return result
 
     def rotation_vector(self) -> F64:
         """(3,) axis times angle [rad]."""
-        return Rotation.from_matrix(self.rotation).as_rotvec()
+        result: F64 = Rotation.from_matrix(self.rotation).as_rotvec()
+        return result
 
     def angle(self) -> float:
         """Angle of the rotation [rad], in [0, pi] (angle-axis, as in Fig. 14)."""
@@ -174,7 +176,8 @@ def nearest_rotation(matrix: NDArray[Any]) -> F64:
     u, _, vt = np.linalg.svd(matrix)
     if np.linalg.det(u @ vt) < 0:
         u[:, 2] *= -1
-    return u @ vt
+    result: F64 = u @ vt
+    return result
 
 
 def _left_jacobian(phi: F64) -> F64:

@@ -65,7 +65,8 @@ class Trajectory:
 
     def quaternions_xyzw(self) -> F64:
         """(N, 4) unit quaternions in TUM's order."""
-        return Rotation.from_matrix(self.rotations).as_quat()
+        result: F64 = Rotation.from_matrix(self.rotations).as_quat()
+        return result
 
     def path_m(self) -> float:
         """Length of the path [m]."""

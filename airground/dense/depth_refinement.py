@@ -56,7 +56,8 @@ def _speckles(plane: F32) -> Mask:
     scaled = np.where(np.isfinite(plane), plane * 16, -16).astype(np.int16)
     cleaned = scaled.copy()
     cv2.filterSpeckles(cleaned, -16, SPECKLE_PX, int(16 * SPECKLE_STEP_PLANES))
-    return (cleaned == -16) & (scaled != -16)
+    result: Mask = (cleaned == -16) & (scaled != -16)
+    return result
 
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)

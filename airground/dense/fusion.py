@@ -47,7 +47,8 @@ class Fusion:
                 min(AT_ONCE, self.iterations - done), done == 0,
                 counts, self.spacing, phi, ahead, dy, dk, dx, STEP, STEP * self.data_weight,
             )  # fmt: skip
-        return phi
+        result: F32 = phi
+        return result
 
 
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy", fastmath=FAST)

@@ -110,4 +110,5 @@ def _depths(
         plane = np.cross(centre / baseline, rays)
         off = np.abs(np.einsum("ij,ij->i", plane, others)) / np.linalg.norm(plane, axis=1)
     good = (parallax * camera.fx > MIN_PARALLAX_PX) & (off * camera.fx < MAX_EPIPOLAR_ERROR_PX)
-    return depth[good & (depth > 0)]
+    result: F64 = depth[good & (depth > 0)]
+    return result

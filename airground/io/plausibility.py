@@ -100,7 +100,8 @@ def upwards(imu: ImuSamples, imu_path: Path) -> F64:
         )
     start = imu.stamps_ns <= imu.stamps_ns[0] + round(START_S * 1e9)
     mean = imu.accelerometer[start].mean(axis=0)
-    return mean / np.linalg.norm(mean)
+    result: F64 = mean / np.linalg.norm(mean)
+    return result
 
 
 def check_up_in_camera(up_camera: F64, imu_path: Path) -> None:

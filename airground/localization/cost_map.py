@@ -116,7 +116,8 @@ class OffsetSearch:
     def _spectrum(self, image: F32) -> C64:
         """`rfft2` of the image with zeros around, not spent on the rows that are all zeros."""
         rows, columns = self._fft_shape
-        return fft.fft(fft.rfft(image, columns, axis=1), rows, axis=0, overwrite_x=True)
+        result: C64 = fft.fft(fft.rfft(image, columns, axis=1), rows, axis=0, overwrite_x=True)
+        return result
 
     def _correlate(self, product: C64, out: F32) -> None:
         """`irfft2` of a product of spectra, not spent on rows that are no offset.

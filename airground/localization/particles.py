@@ -35,7 +35,8 @@ def weights(costs: Floats, sigma: float) -> F64:
     if not feasible.any():
         return np.full(len(weight), 1.0 / len(weight))
     weight[~feasible] = np.median(weight[feasible])
-    return weight / weight.sum()
+    result: F64 = weight / weight.sum()
+    return result
 
 
 def resample(weight: F64, rng: np.random.Generator) -> I64:
@@ -43,7 +44,8 @@ def resample(weight: F64, rng: np.random.Generator) -> I64:
     m = len(weight)
     cumulative = np.cumsum(weight)
     pointers = (rng.random() + np.arange(m)) / m * cumulative[-1]
-    return np.minimum(np.searchsorted(cumulative, pointers, side="right"), m - 1)
+    result: I64 = np.minimum(np.searchsorted(cumulative, pointers, side="right"), m - 1)
+    return result
 
 
 def draw_cells(
@@ -66,4 +68,5 @@ def densest_mode(particles: F64) -> Mask:
     """(M,) which particles lie around the one that has the most neighbours (in x, y)."""
     difference = particles[:, None, :2] - particles[None, :, :2]
     near = (difference**2).sum(axis=2) < MODE_RADIUS_M**2
-    return near[np.argmax(near.sum(axis=1))]
+    result: Mask = near[np.argmax(near.sum(axis=1))]
+    return result

@@ -66,7 +66,8 @@ def _nearby(ground: F32, aerial_ground: F64, settings: Refinement) -> F32:
         margin += settings.local_search_radius_m + 0.3
     low, high = aerial_ground.min(axis=0)[:2] - margin, aerial_ground.max(axis=0)[:2] + margin
     inside = ((ground[:, :2] >= low) & (ground[:, :2] <= high)).all(axis=1)
-    return ground[inside]
+    result: F32 = ground[inside]
+    return result
 
 
 def _levelled(motion: SE3, points: F32) -> SE3:
