@@ -11,7 +11,6 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
-from importlib import metadata
 from pathlib import Path
 
 from evaluation.setup.environment import usable_cores
@@ -19,25 +18,21 @@ from evaluation.setup.system_libraries import SYSTEM_LIBRARIES
 
 MIN_MEMORY_GIB = 4.0
 MIN_DISK_GIB = 4.0
-WORKING_PYOPENGL = (3, 1, 10)
-"""The oldest PyOpenGL whose EGL MuJoCo can use."""
 
 MUJOCO_FRAME = """
-import mujoco
+import mujoco, numpy as np
+from airground.core.camera import PinholeCamera
+from airground.core.se3 import SE3
+from sim.recording.render import Renderer, with_cameras
 spec = mujoco.MjSpec()
 spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[.1, .1, .1])
 spec.worldbody.add_light(pos=[0, 0, 3])
-spec.worldbody.add_camera(name="c", pos=[0, 0, 1])
-model = spec.compile()
-data = mujoco.MjData(model)
-mujoco.mj_forward(model, data)
-renderer = mujoco.Renderer(model, 60, 80)
-renderer.update_scene(data, "c")
-assert renderer.render().max() > 0, "the picture is black"
-renderer.enable_depth_rendering()
-centre = float(renderer.render()[30, 40])
-assert abs(centre - 0.9) < 1e-3, f"depth of the box is {centre} m instead of 0.9 m"
-renderer.close()
+camera = PinholeCamera(80, 60, 70.0, 70.0, 40.0, 30.0)
+looking_down = SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 1.0]))
+with Renderer(with_cameras(spec, {"c": camera})) as renderer:
+    picture, depth = renderer.draw("c", looking_down)
+assert picture.max() > 0, "the picture is black"
+assert abs(depth[30, 40] - 0.9) < 1e-3, f"depth of the box is {depth[30, 40]} m instead of 0.9 m"
 """
 
 PYRENDER_FRAME = """
@@ -100,7 +95,6 @@ def examine() -> list[Finding]:
         memory(),
         disk(Path.cwd()),
         *libraries(),
-        pyopengl(metadata.version("PyOpenGL")),
         *rendering(),
         threading(),
     ]
@@ -155,17 +149,10 @@ def libraries() -> Iterator[Finding]:
         yield _found(library.soname, fine, detail, remedy, otherwise)
 
 
-def pyopengl(version: str) -> Finding:
-    """pyrender asks for a PyOpenGL on which MuJoCo's EGL fails."""
-    numbers = tuple(int(part) for part in version.split(".")[:3] if part.isdigit())
-    remedy = "install 3.1.10 or newer without dependencies: pip install --no-deps PyOpenGL"
-    return _found("PyOpenGL", numbers >= WORKING_PYOPENGL, version, remedy)
-
-
 def rendering() -> Iterator[Finding]:
     """Render a frame each with EGL and OSMesa; one of the two suffices."""
     results = {
-        (name, backend): _try(script, MUJOCO_GL=backend, PYOPENGL_PLATFORM=backend)
+        (name, backend): _try(script, PYOPENGL_PLATFORM=backend)
         for name, script in (("mujoco", MUJOCO_FRAME), ("pyrender", PYRENDER_FRAME))
         for backend in ("egl", "osmesa")
     }
@@ -174,7 +161,7 @@ def rendering() -> Iterator[Finding]:
         if works:
             yield Finding(f"{name} with {backend}", Health.FINE, "renders")
         elif results[name, other][0]:
-            remedy = f"not needed; MUJOCO_GL={other} PYOPENGL_PLATFORM={other} works"
+            remedy = f"not needed; PYOPENGL_PLATFORM={other} works"
             yield Finding(f"{name} with {backend}", Health.POOR, said, remedy)
         else:
             remedy = "install libegl1 libgl1 libgl1-mesa-dri, or libosmesa6"

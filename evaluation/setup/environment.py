@@ -58,11 +58,19 @@ def prepare(threads: int | None = None) -> int:
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     # OpenMP first: with an outdated TBB, which numba would prefer, each run prints a warning.
     os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp tbb workqueue")
-    backend = "egl" if _loads("libEGL.so.1") else "osmesa"
-    os.environ.setdefault("MUJOCO_GL", backend)
-    os.environ.setdefault("PYOPENGL_PLATFORM", backend)
+    _choose_renderer()
     _keep_freed_memory()
     return count
+
+
+def _choose_renderer() -> None:
+    """EGL where its library loads, else OSMesa, for pyrender and for `sim.recording.render`.
+
+    MuJoCo is kept from importing its own EGL module, which fails with PyOpenGL 3.1.0.
+    """
+    works = _loads("libEGL.so.1") and os.environ.get("MUJOCO_GL") != "osmesa"
+    os.environ.setdefault("PYOPENGL_PLATFORM", "egl" if works else "osmesa")
+    os.environ["MUJOCO_GL"] = "disabled"
 
 
 def prepare_worker(threads: int) -> None:

@@ -6,10 +6,11 @@ y up, ours (OpenCV) along +z with y down.
 
 from __future__ import annotations
 
-import sys
+import os
 from collections.abc import Mapping
 from types import TracebackType
 
+import glcontext
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,10 @@ from airground.core.se3 import SE3
 from airground.errors import AirgroundError
 
 _OPENCV_FROM_OPENGL = np.diag([1.0, -1.0, -1.0])
+_COMPATIBILITY_PROFILE = 210
+"""OpenGL 2.1. MuJoCo uses functions that a context of 3.1 or newer lacks."""
+_MAX_DEVICES = 16
+"""More EGL devices than one machine has."""
 
 
 class Renderer:
@@ -40,7 +45,7 @@ class Renderer:
         self._scene = mujoco.MjvScene(self._model, maxgeom=self._model.ngeom + 100)
         self._option = mujoco.MjvOption()
         visual = self._model.vis.global_
-        self._window = _open_window(visual.offwidth, visual.offheight)
+        self._window = _open_context(visual.offwidth, visual.offheight)
         self._context = mujoco.MjrContext(self._model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
         self._context.readDepthMap = mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
@@ -58,6 +63,7 @@ class Renderer:
 
     def close(self) -> None:
         """Free the graphics context."""
+        self._window.make_current()
         self._context.free()
         self._window.free()
 
@@ -102,21 +108,56 @@ class Renderer:
         return depth
 
 
-def _open_window(width: int, height: int) -> mujoco.GLContext:
-    """A current graphics context without a screen."""
-    egl = sys.modules.get("mujoco.egl")
-    if egl is not None:
-        # pyrender shuts the shared display down when it is done; have it opened again.
-        egl.EGL_DISPLAY = None  # type: ignore[attr-defined]
+class _EglContext:
+    """OpenGL without a screen, on the first device that offers it.
+
+    MuJoCo's own EGL module does not import with the PyOpenGL that pyrender pins.
+    `MUJOCO_EGL_DEVICE_ID` chooses the device.
+    """
+
+    def __init__(self) -> None:
+        chosen = os.environ.get("MUJOCO_EGL_DEVICE_ID")
+        devices = range(_MAX_DEVICES) if chosen is None else [int(chosen)]
+        create = glcontext.get_backend_by_name("egl")
+        errors = []
+        for device in devices:
+            try:
+                self._context = create(
+                    mode="standalone",
+                    glversion=_COMPATIBILITY_PROFILE,
+                    libgl="libGL.so.1",
+                    libegl="libEGL.so.1",
+                    device_index=device,
+                )
+                return
+            except Exception as error:  # glcontext raises no subclass
+                errors.append(error)
+        raise errors[0]
+
+    def make_current(self) -> None:
+        self._context.__enter__()
+
+    def free(self) -> None:
+        self._context.__exit__(None, None, None)
+        self._context.release()
+
+
+def _open_context(width: int, height: int) -> _EglContext | mujoco.GLContext:
+    """A current graphics context without a screen: EGL, or OSMesa where that is asked for."""
     try:
-        window = mujoco.GLContext(width, height)
-        window.make_current()
+        if os.environ.get("PYOPENGL_PLATFORM") == "osmesa":
+            from mujoco.osmesa import GLContext
+
+            context = GLContext(width, height)
+        else:
+            context = _EglContext()
+        context.make_current()
     except Exception as error:  # each backend has its own kinds
         reason = (str(error) or type(error).__name__).splitlines()[0]
         raise AirgroundError(
             f"cannot draw without a screen ({reason}); `airground doctor` says what is missing"
         ) from error
-    return window
+    return context
 
 
 def with_cameras(spec: mujoco.MjSpec, cameras: Mapping[str, PinholeCamera]) -> mujoco.MjModel:

@@ -80,7 +80,32 @@ def test_threads_are_set_for_every_library(monkeypatch: pytest.MonkeyPatch) -> N
     prepare(threads=3)
     assert [environment[name] for name in names] == ["3", "3", "3"]
     assert environment["OPENBLAS_NUM_THREADS"] == "1"
-    assert environment["MUJOCO_GL"] in ("egl", "osmesa")
+
+
+@pytest.mark.parametrize(
+    ("user", "platform"),
+    [
+        ({}, "egl"),
+        ({"MUJOCO_GL": "egl"}, "egl"),
+        ({"MUJOCO_GL": "osmesa"}, "osmesa"),
+        ({"PYOPENGL_PLATFORM": "osmesa"}, "osmesa"),
+    ],
+)
+def test_osmesa_is_used_where_asked_for(
+    monkeypatch: pytest.MonkeyPatch, user: dict[str, str], platform: str
+) -> None:
+    monkeypatch.setattr("evaluation.setup.environment._loads", lambda _soname: True)
+    monkeypatch.setattr("os.environ", user)
+    prepare()
+    assert user["PYOPENGL_PLATFORM"] == platform
+    assert user["MUJOCO_GL"] == "disabled"
+
+
+def test_osmesa_stands_in_for_a_missing_egl(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("evaluation.setup.environment._loads", lambda _soname: False)
+    monkeypatch.setattr("os.environ", environment := {})
+    prepare()
+    assert environment["PYOPENGL_PLATFORM"] == "osmesa"
 
 
 def test_a_container_bounds_the_cores(tmp_path: Path) -> None:
