@@ -11,6 +11,7 @@ from __future__ import annotations
 import hashlib
 import os
 import re
+from collections.abc import Generator
 from functools import cache
 from pathlib import Path
 
@@ -19,16 +20,22 @@ import pytest
 from tests.sources import ROOMS, ROOT, imports, sources
 
 FOLDER = Path(os.environ["PASSED_BEFORE"])
+MARKS = pytest.StashKey[dict[str, Path]]()
+"""The file of each slow test that exists once the test has passed."""
 BY_NAME = {"importlib", "importlib.import_module", "pkgutil", "runpy"}
 """Imports with which a file can run code that it does not import."""
 IN_TESTS = BY_NAME | {"subprocess"}
 """Likewise in tests, which start Python processes; other code starts only foreign programs."""
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    config.stash[MARKS] = {}
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    known = [
-        item for item in items if item.get_closest_marker("slow") and mark(item.nodeid).exists()
-    ]
+    marks = config.stash[MARKS]
+    marks.update((item.nodeid, mark(item)) for item in items if item.get_closest_marker("slow"))
+    known = [item for item in items if item.nodeid in marks and marks[item.nodeid].exists()]
     if known:
         config.hook.pytest_deselected(items=known)
         items[:] = [item for item in items if item not in known]
@@ -39,25 +46,34 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
         session.exitstatus = pytest.ExitCode.OK
 
 
-def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    if report.when == "call" and report.passed and "PYTEST_XDIST_WORKER" not in os.environ:
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    report = yield
+    passed = item.config.stash[MARKS].get(item.nodeid)
+    if passed is not None and call.when == "call" and report.passed:
         FOLDER.mkdir(parents=True, exist_ok=True)
-        mark(report.nodeid).touch()
+        passed.touch()
+    return report
 
 
-def mark(test: str) -> Path:
+def mark(item: pytest.Item) -> Path:
     """The file that says that a test passed with the present sources."""
-    content = digest_behind(test.partition("::")[0])
-    return FOLDER / hashlib.sha256(f"{test} {content}".encode()).hexdigest()
+    file = item.nodeid.partition("::")[0]
+    subject = item.get_closest_marker("subject")
+    files = files_behind(file) if subject is None else (file, *subject.args)
+    found = hashlib.sha256(item.nodeid.encode())
+    for file in files:
+        found.update(file.encode() + b"\0" + digest(file))
+    return FOLDER / found.hexdigest()
 
 
 @cache
-def digest_behind(test_file: str) -> str:
-    """A digest of all that the tests of a file may depend on."""
-    found = hashlib.sha256()
-    for file in sorted({*python_behind(test_file), *data_files(), *pages_behind(test_file)}):
-        found.update(file.encode() + b"\0" + digest(file))
-    return found.hexdigest()
+def files_behind(test_file: str) -> tuple[str, ...]:
+    """All that the tests of a file may depend on."""
+    files = {*python_behind(test_file), *data_files(), *pages_behind(test_file)}
+    return tuple(sorted(files))
 
 
 @cache
