@@ -3,12 +3,13 @@
 import mujoco
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
+from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from sim.appearance.bake_light import LightBaker
 from sim.appearance.pictures import CUBE_FACES, add_picture
 from sim.geometry.surface import box_mesh, join, rectangle_mesh
+from sim.recording.render import Renderer, with_cameras
 from sim.scene import Light, Scene, load_scene
 from sim.world.world import World, build_world
 
@@ -79,23 +80,16 @@ def test_each_picture_of_a_cube_lies_on_its_face_and_the_right_way_up() -> None:
     add_picture(spec, "cube", cube.reshape(6 * side, side, 3), cube=True)
     half = np.array([0.3, 0.2, 0.15])
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=half, material="cube")
-    for index, (normal, columns, rows) in enumerate(CUBE_FACES):
-        pose = np.stack([columns, -np.array(rows), normal], axis=1)
-        quaternion = np.roll(Rotation.from_matrix(pose).as_quat(), 1)
-        place = 2.0 * np.array(normal)
-        spec.worldbody.add_camera(name=f"c{index}", pos=place, quat=quaternion, fovy=12)
-    model = spec.compile()
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    renderer = mujoco.Renderer(model, 60, 60)
-    for index in range(6):
-        renderer.update_scene(data, f"c{index}")
-        seen = renderer.render().astype(int)
-        middle = seen[30, 30]
-        assert middle == pytest.approx([125, 125, 40 * index + 10], abs=8)
-        assert seen[30, 40, 0] > middle[0] + 5
-        assert seen[40, 30, 1] > middle[1] + 5
-    renderer.close()
+    camera = PinholeCamera(60, 60, 285.0, 285.0, 29.5, 29.5)
+    with Renderer(with_cameras(spec, {"camera": camera})) as renderer:
+        for index, (normal, columns, rows) in enumerate(CUBE_FACES):
+            rotation = np.stack([columns, rows, -np.array(normal)], axis=1)
+            picture, _ = renderer.draw("camera", SE3(rotation, 2.0 * np.array(normal)))
+            seen = picture.astype(int)
+            middle = seen[30, 30]
+            assert middle == pytest.approx([125, 125, 40 * index + 10], abs=8)
+            assert seen[30, 40, 0] > middle[0] + 5
+            assert seen[40, 30, 1] > middle[1] + 5
 
 
 def test_light_falls_off_in_shadow_and_is_soft_at_its_edge() -> None:
