@@ -30,11 +30,8 @@ COVERED_BY = 5
 
 @dataclass(eq=False)
 class KeyframeCuller:
-    """Looks at one or two keyframes whenever a new one was made.
-
-    Those of the window are never taken out, nor the first keyframe, and none that adjusting the
-    whole map still needs for its inertial motion.
-    """
+    """Looks at one or two keyframes whenever a new one was made; never culls the first, those of
+    the window, or one whose inertial motion adjusting the whole map still needs."""
 
     map: SparseMap
     adjuster: MapAdjuster

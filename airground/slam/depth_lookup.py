@@ -20,8 +20,6 @@ def inverse_depths_at(depth: F32 | None, pixels: Floats, max_depth_m: float) -> 
 
     Args:
         depth: (height, width) depth [m], NaN where missing; None without a depth camera.
-        pixels: (N, 2) pixels (x, y) of the corners.
-        max_depth_m: Largest depth to use [m].
     """
     inverse = np.full(len(pixels), np.nan)
     if depth is not None:

@@ -48,7 +48,6 @@ class FeatureTracker:
         """Follow every corner into the next image; those not found are given up.
 
         Args:
-            image: (height, width) grey image.
             start: (N, 2) expected pixels of the corners.
             extra_levels: More pyramid levels, where the expectation is poor.
         """
@@ -75,10 +74,8 @@ class FeatureTracker:
         self.keep(self.failures < patience)
 
     def thin(self, cell_px: float) -> None:
-        """Keep one corner a cell of a grid, the one known longest.
-
-        Seen from higher up, corners crowd together and would leave no room for others.
-        """
+        """Keep one corner a cell of a grid, the one known longest: seen from higher up, corners
+        crowd together and would leave no room for others."""
         columns, rows = np.floor(self.pixels / cell_px).astype(np.int64).T
         by_age = np.argsort(self.ids, kind="stable")
         cells = (rows * 10_000 + columns)[by_age]
@@ -97,11 +94,8 @@ class FeatureTracker:
 def expected_pixels(
     sparse_map: SparseMap, tracker: FeatureTracker, camera: PinholeCamera, here: SE3, there: SE3
 ) -> F64:
-    """(N, 2) pixels of the tracker's corners in the next image.
-
-    Map points go by their place, other corners as if they were as far as most map points.
-    `here` and `there` are `T_map_camera` of the newest image and, as predicted, of the next.
-    """
+    """(N, 2) pixels of the corners in the next image, by `T_map_camera` now (`here`) and as
+    predicted (`there`). Corners without a map point are taken to be as far as most map points."""
     pixels = tracker.pixels.astype(np.float64)
     if len(pixels) == 0:
         return pixels

@@ -13,7 +13,6 @@ class Frame:
     """One grey image, with depth where there is a depth camera.
 
     Attributes:
-        stamp_ns: Stamp of the image [ns].
         image: (height, width) grey image.
         depth: (height, width) depth [m], NaN where missing; None without a depth camera.
     """

@@ -44,13 +44,10 @@ def frame_pose(
     Args:
         points_map: (N, 3) map points [m].
         pixels: (N, 2) pixels of the points in the image.
-        camera: Camera of the image.
-        T_map_camera_predicted: Predicted pose of the camera.
         sigma_px: Standard deviation of a pixel per axis [px].
         rotation_sigma: How well the predicted rotation is known [rad]; None if it is not.
         inertial: Whether the predicted position is good to centimetres.
         min_points: Least number of inliers of a pose.
-        rng: Source of RANSAC's samples.
         inverse_depths: (N,) measured inverse depths [1/m], NaN without one; None without any.
         inverse_depth_sigma: Standard deviation of the inverse depths [1/m].
 

@@ -126,7 +126,5 @@ class FrontEnd(Protocol[Image_contra]):
         """Finish after the last image: run deferred optimization."""
 
     def trajectory(self) -> Trajectory | None:
-        """The newest poses of all images tracked so far; None before the first.
-
-        Poses returned by `track` do not change; these follow corrections.
-        """
+        """The newest poses of all images tracked so far, corrections included; None before the
+        first. Poses returned by `track` do not change."""

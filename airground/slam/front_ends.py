@@ -1,7 +1,7 @@
 """The front ends by name: a literal table for each robot.
 
-To add one, write a class that fulfils `front_end.FrontEnd` and put a line here; the
-contract test (`tests/slam/test_front_ends.py`) then runs it too.
+To add one, write a class that fulfils `front_end.FrontEnd` and put a line here; the contract
+test then runs it too.
 """
 
 from __future__ import annotations

@@ -45,10 +45,8 @@ class ImageTurn:
         return np.array([about_x, about_y])
 
     def rig_turn(self, image: U8, last_turn: F64, R_rig_camera: F64) -> F64:
-        """(3, 3) turn of the rig to the next image; about the optical axis as last time.
-
-        Where the images are not clear it is `last_turn`, (3, 3), that to the previous image.
-        """
+        """(3, 3) turn of the rig to the next image, about the optical axis as in `last_turn`, the
+        turn to the previous one. Where the images are not clear it is `last_turn` itself."""
         slide = self.follow(image)
         if slide is None:
             return last_turn

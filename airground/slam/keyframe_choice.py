@@ -44,10 +44,8 @@ class KeyframeChoice:
     parameters: KeyframeSlam
 
     def wanted(self, tracker: FeatureTracker, state: RigState, stamp_ns: int, timed: bool) -> bool:
-        """Whether the newest image shows enough that the last keyframe did not.
-
-        With `timed`, a keyframe is also due now and then if nothing is new.
-        """
+        """Whether the newest image shows enough that the last keyframe did not; with `timed`, a
+        keyframe is also due now and then if nothing is new."""
         last, parameters = self.map.keyframes[-1], self.parameters
         if timed and (stamp_ns - last.stamp_ns) * 1e-9 >= parameters.keyframe_interval_s:
             return True

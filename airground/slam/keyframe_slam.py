@@ -47,17 +47,12 @@ class KeyframeSlam:
     """The machinery that both robots share.
 
     Args:
-        calibration: Nominal calibration of the robot.
         parameters: The robot's section of the configuration.
-        rng: Source of the samples of outlier rejection.
         inverse_depth_sigma: Standard deviation of measured inverse depth [1/m].
         max_depth_m: Largest depth that starts a point [m].
 
     Attributes:
-        map: Keyframes and points.
         tracker: The corners that are followed.
-        motion: Motion model that predicts the next state.
-        state: Newest state.
         stamp_ns: Stamp of the newest state [ns]; None before the map began.
         inertial: Whether the map is metric and gravity-aligned and the velocity known, so
             that the accelerometer counts.
@@ -133,11 +128,8 @@ class KeyframeSlam:
 
     def track(self, frame: Frame) -> tuple[PoseFit | None, bool]:
         """Follow the map into the next image.
-
-        Returns:
-            The fit of the newest pose, None where the image did not give one; and whether
-            the map was adjusted as a whole.
-        """
+        Returns the fit of the newest pose, None where the image gave none, and whether the map was
+        adjusted as a whole."""
         turn = self._turn
         if self._image_turn is not None:
             turn = self._image_turn.rig_turn(frame.image, turn, self.T_rig_camera.rotation)

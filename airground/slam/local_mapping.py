@@ -37,8 +37,7 @@ class LocalMapper:
 
     Attributes:
         max_depth_m: Largest depth that starts a point [m].
-        found_old: Whether the newest keyframe found points again of keyframes older than the
-            window.
+        found_old: Whether the newest keyframe found points of keyframes older than the window.
     """
 
     map: SparseMap
@@ -65,7 +64,6 @@ class LocalMapper:
             state: Tracked state of the rig at that image.
             motion: Inertial motion since the last keyframe; None where it is not known.
             inertial: Whether the map is metric and gravity-aligned.
-            still: Whether the robot is at rest.
         """
         ids, pixels = self.tracker.ids.copy(), self.tracker.pixels.astype(np.float64)
         depths = inverse_depths_at(frame.depth, pixels, self.max_depth_m)
@@ -101,10 +99,8 @@ class LocalMapper:
         self.map.place(ids[good], points.points[good])
 
     def _reuse(self, keyframe: Keyframe, depth: F32 | None) -> bool:
-        """Look for points of old keyframes: this is what closes loops before they open.
-
-        Returns whether there were any.
-        """
+        """Look for points of old keyframes, which closes loops before they open.
+        Returns whether there were any."""
         old = len(self.map.keyframes) - 1 - self.parameters.window
         if old <= 0 or self.parameters.reused_keyframes == 0:
             return False

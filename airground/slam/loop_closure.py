@@ -129,14 +129,8 @@ class LoopCloser:
 
 @dataclass(frozen=True, eq=False)
 class MapSnapshot:
-    """What adjustment changes of a map, to restore when a correction proves wrong.
-
-    Attributes:
-        states: States of the keyframes.
-        sightings: `ids`, `pixels` and `inverse_depths` of the keyframes, which are replaced
-            and never written to.
-        positions, point_states: Positions and states of the points.
-    """
+    """What adjustment changes of a map, to restore when a correction proves wrong; `sightings` are
+    the keyframes' `ids`, `pixels` and `inverse_depths`, which are replaced, never written to."""
 
     states: list[RigState]
     sightings: list[tuple[I64, F64, F64]]

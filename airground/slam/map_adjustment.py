@@ -52,7 +52,6 @@ class MapAdjuster:
 
     Attributes:
         inverse_depth_sigma: Standard deviation of measured inverse depth [1/m].
-
         motions: Inertial motion before each keyframe, by its index, where known.
         settled_ns: Keyframes up to this stamp took part in adjusting the whole map long after
             they were made, and hold what their inertial motions had to tell.
@@ -70,11 +69,8 @@ class MapAdjuster:
     def adjust_window(self, inertial: bool) -> F64 | None:
         """Move the newest keyframes and their points; older ones that saw them hold still.
 
-        Args:
-            inertial: Whether the map is metric and gravity-aligned, so that the IMU counts.
-
-        Returns:
-            (6, 6) covariance of the newest keyframe's pose, where there is one.
+        The IMU counts if `inertial`: the map is metric and gravity-aligned. Returns the (6, 6)
+        covariance of the newest keyframe's pose, where there is one.
         """
         count = len(self.map.keyframes)
         first_free = max(1, count - self.parameters.window)
@@ -128,10 +124,8 @@ class MapAdjuster:
 
     def skip(self, keyframe: int, inertial: bool) -> None:
         """Join the motions before and after a keyframe that is about to be culled.
-
-        Where they are too long or not known on both sides they go. Their other ends hold from
-        then on if inertia counts (`inertial`).
-        """
+        Motions that are too long, or not known on both sides, go; their other ends then hold
+        if inertia counts (`inertial`)."""
         before, after = self.motions.pop(keyframe, None), self.motions.pop(keyframe + 1, None)
         self.motions = {k if k < keyframe else k - 1: m for k, m in self.motions.items()}
         if before is None and after is None:
@@ -146,9 +140,7 @@ class MapAdjuster:
 
     def _holding(self, free: list[int]) -> list[int]:
         """Older keyframes that share the most points with the free ones, in order of time.
-
-        The one just before the window is always among them: inertial motion starts there.
-        """
+        The one just before the window is always among them: inertial motion starts there."""
         shared = self.map.shared(self.map.seen_by(free))[: free[0]]
         shared[-1] = np.iinfo(shared.dtype).max
         best = np.argsort(-shared, kind="stable")[: self.parameters.fixed_keyframes]

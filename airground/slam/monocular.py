@@ -25,16 +25,11 @@ MAX_UNSEEN_S = 3.5
 
 
 class MonocularSlam:
-    """A front end of the MAV.
+    """A front end of the MAV, with the section `monocular_slam` of the configuration.
 
     From rest the map is metric at once: the accelerometer carries the robot through its
     take-off until enough points are triangulated. In motion it begins with two views and
     an unknown scale, and poses are given out when the scale is known.
-
-    Args:
-        calibration: Nominal calibration of the robot.
-        config: Configuration; its section `monocular_slam` is used.
-        rng: Source of the samples of outlier rejection.
     """
 
     def __init__(

@@ -107,14 +107,9 @@ class MotionModel:
     def measured(
         self, before: RigState, prediction: Prediction, T_map_rig: SE3, seconds: float | None
     ) -> RigState:
-        """The state at an image that gave a pose.
+        """The state at an image that gave a pose, `seconds` after the previous image [s].
 
-        Args:
-            before: The state at the image before.
-            prediction: Prediction from that state.
-            T_map_rig: Measured pose.
-            seconds: Time since the previous image [s]; None if it had no pose, so that the velocity
-                is unknown.
+        None for `seconds`: the previous image had no pose, and the velocity is unknown.
         """
         state = prediction.state.posed(T_map_rig)
         if prediction.inertial:
@@ -124,10 +119,8 @@ class MotionModel:
         return replace(state, velocity=(state.position - before.position) / seconds)
 
     def coasted(self, before: RigState, prediction: Prediction, unseen_s: float) -> RigState:
-        """The state at an image that shows nothing: a robot goes on for a while.
-
-        The last image with a pose was `unseen_s` earlier [s].
-        """
+        """The state at an image that shows nothing, `unseen_s` after the last one with a pose [s]:
+        a robot goes on for a while."""
         state = prediction.state
         if unseen_s > MAX_COAST_S:
             turned = before if prediction.rotation_sigma is None else state

@@ -25,13 +25,7 @@ times smaller than those of an edge with as many points."""
 
 @dataclass(frozen=True, eq=False)
 class Edge:
-    """The relative pose of two keyframes.
-
-    Attributes:
-        first, second: Indices of the keyframes.
-        T_first_second: Pose of the second in the first.
-        points: Number of shared points, the weight of the edge.
-    """
+    """Pose of keyframe `second` in keyframe `first`, weighted by the number of shared points."""
 
     first: int
     second: int
@@ -61,12 +55,8 @@ def straighten(sparse_map: SparseMap, loop: Edge) -> None:
 
 
 def optimize(poses: Sequence[SE3], edges: Sequence[Edge]) -> list[SE3]:
-    """The poses that fit the edges best, by Levenberg-Marquardt (Open3D's, repeatable).
-
-    Args:
-        poses: `T_map_rig` of the keyframes, first guess; the first is held.
-        edges: Relative poses; all keyframes must hang together by them.
-    """
+    """The poses `T_map_rig` that fit the edges best, by Levenberg-Marquardt (Open3D's, repeatable).
+    The first pose is held; all keyframes must hang together by edges."""
     # 160 MiB in a process that only tracks, where most recordings close no loop.
     import open3d as o3d
 

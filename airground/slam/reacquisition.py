@@ -43,10 +43,7 @@ def keyframes_in_view(
     """The keyframes with a similar view that saw most of the points.
 
     Args:
-        sparse_map: Map with keyframes and points.
         candidates: Keyframes to choose from.
-        T_map_camera: Pose of the view.
-        T_rig_camera: Pose of the camera in the rig.
         points_in_view: Numbers of the points that the view should see.
         count: Most keyframes to return.
         least: Least number of the points that a keyframe must have seen.
@@ -106,10 +103,8 @@ def find_in_keyframes(
     """Follow points from several old keyframes into an image, each from the first that has it.
 
     Args:
-        sparse_map: With the keyframes.
         keyframes: Indices of the keyframes, the most similar view first.
         ids: (n,) numbers of the points, sorted.
-        image: (height, width) grey image.
         expected: (n, 2) expected pixels of the points in `image`.
         window_px, levels: Patch size and pyramid levels as in `optical_flow.flow`.
         search_px: Largest distance of a point from its expected pixel [px].

@@ -31,13 +31,7 @@ NOTHING = np.empty(0, np.int64)
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """The map, found again.
-
-    Attributes:
-        ids: (n,) numbers of the points seen.
-        pixels: (n, 2) pixels of the points.
-        fit: Pose of the camera by these points.
-    """
+    """The map, found again: points (n,) seen at pixels (n, 2), and the camera's pose by them."""
 
     ids: I64
     pixels: F64
@@ -74,7 +68,6 @@ class Recovery:
         """Look where the map should be if the camera is about there.
 
         Args:
-            image: (height, width) grey image.
             T_map_camera: Approximate pose of the camera.
             turn_known: Whether the rotation is known from a gyro.
             among: Keyframes to look for; all by default.

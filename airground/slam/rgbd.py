@@ -25,15 +25,10 @@ LEVEL_SIGMA = np.deg2rad(0.3)
 
 
 class RgbdSlam:
-    """A front end of the ground robot.
+    """A front end of the ground robot, with the section `rgbd_slam` of the configuration.
 
     Depth puts corners into the map at once, so tracking begins with the first image that
     shows something, also while the camera only turns.
-
-    Args:
-        calibration: Nominal calibration of the robot.
-        config: Configuration; its section `rgbd_slam` is used.
-        rng: Source of the samples of outlier rejection.
     """
 
     def __init__(

@@ -25,9 +25,7 @@ class Keyframe:
     """One image that stays, its state, and what it saw.
 
     Attributes:
-        stamp_ns: Stamp of the image [ns].
         image: (height, width) uint8 grey image.
-        state: State of the rig.
         ids: (n,) int64 numbers of the points seen, each once.
         pixels: (n, 2) float64 pixels of the points.
         inverse_depths: (n,) measured inverse depths [1/m]; NaN without one.
@@ -123,11 +121,8 @@ class SparseMap:
         self.states[ids] = DROPPED
 
     def cull(self, keyframe: int) -> None:
-        """Take a keyframe out; not the first.
-
-        Candidates that were first seen in it begin in the next keyframe that saw them. A point
-        that fewer than two others saw goes with it.
-        """
+        """Take a keyframe out, not the first; a point that fewer than two others saw goes with it.
+        Candidates first seen in it begin in the next keyframe that saw them."""
         gone = self.keyframes.pop(keyframe)
         self.culled += 1
         # What was first seen in the culled keyframe counts as old as the one before it.

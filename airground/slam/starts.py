@@ -40,10 +40,8 @@ MAX_OFF_GRAVITY = 0.5
 
 
 def level_start(motion: MotionModel, calibration: RobotCalibration, stamp_ns: int) -> RigState:
-    """The state in which a map begins: camera in the origin, its x axis along the map's.
-
-    Up is where the accelerometer says; without one, where it is if the body stands level.
-    """
+    """The state in which a map begins: camera in the origin, its x axis along the map's. Up is by
+    the accelerometer; without one, the body is taken to stand level."""
     up = calibration.T_body_imu.rotation.T[:, 2]
     if motion.buffer is not None:
         now = motion.imu_time(stamp_ns)

@@ -15,10 +15,8 @@ FIRST_IMAGES = 1024
 
 
 class TrackedPath:
-    """Every image with a published pose, in order of time.
-
-    Keyframes are known by their stamps. The images of a culled one go to another.
-    """
+    """Every image with a published pose, in order of time; keyframes are known by their stamps. The
+    images of a culled one go to another."""
 
     def __init__(self) -> None:
         self.clear()

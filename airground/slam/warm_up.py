@@ -26,10 +26,8 @@ DARK = range(70, 73)
 
 
 def warm_up_slam(rng: np.random.Generator) -> None:
-    """Track a camera that swings over a flat texture, as both robots would.
-
-    The MAV begins once at rest and once in motion.
-    """
+    """Track a camera that swings over a flat texture, as both robots would; the MAV begins once at
+    rest and once in motion."""
     texture = _texture(rng)
     noise = ImuNoise(1e-4, 1e-5, 1e-3, 1e-4)
     calibration = RobotCalibration(CAMERA, DOWN, SE3.identity(), noise)

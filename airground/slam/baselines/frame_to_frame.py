@@ -36,11 +36,9 @@ class Aligner(Protocol):
 
 
 class FrameToFrame:
-    """A front end for the ground robot that chains the motions between frames.
-
-    A frame that cannot be aligned is lost, and the next is aligned with the last that was
-    not, for up to a second; after that it stays lost, since it has no map to return to.
-    """
+    """A front end for the ground robot that chains the motions between frames. A frame that cannot
+    be aligned is lost; the next is aligned with the last good one for up to a second, and after
+    that tracking stays lost, as there is no map."""
 
     def __init__(self, calibration: RobotCalibration, aligner: Aligner) -> None:
         self._start = LevelStart(calibration)
@@ -94,11 +92,8 @@ def _can_be_aligned(image: GroundImage) -> bool:
 
 
 class LevelStart:
-    """Makes z of a map point up, as well as can be known as the first image is taken.
-
-    By the accelerometer where it reads gravity and nothing else; otherwise the body is taken
-    to be level, and the calibration says how the camera sits in it.
-    """
+    """Makes z of a map point up: by the accelerometer where it reads gravity and nothing else,
+    otherwise by a body taken to be level and the camera's mounting in it."""
 
     def __init__(self, calibration: RobotCalibration) -> None:
         self._calibration = calibration

@@ -15,10 +15,7 @@ class TrajectoryFile:
     A stamp between two poses that are at most 1.5 usual steps apart is interpolated; one
     outside, or in a longer gap, takes the nearest pose if that is within half a step, and
     is lost otherwise. The file's own frame is the map: it must be metric with z up, and its
-    poses those of the camera.
-
-    Args:
-        trajectory: The poses `T_map_camera`.
+    poses `T_map_camera`.
     """
 
     def __init__(self, trajectory: Trajectory) -> None:

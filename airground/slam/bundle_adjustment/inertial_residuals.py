@@ -140,8 +140,7 @@ def linearize_motions(
     """The cost of all motions; whitened `residuals` (F, 15) and `jacobians` (F, 15, 30).
 
     Args:
-        firsts, durations, rotations, velocities, positions, biases, by_biases, whitening: Fields
-            of `PackedMotions`.
+        firsts, ..., whitening: Fields of `PackedMotions`.
         R_map_rig: (K, 3, 3) rotations of the keyframes.
         vectors: (K, 12) position, velocity, gyro bias, accelerometer bias.
         residuals, jacobians: Results, overwritten.

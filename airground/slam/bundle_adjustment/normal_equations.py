@@ -79,12 +79,8 @@ class Model:
     """All that stays the same while the estimate moves.
 
     Args:
-        observations: Sorted observations.
-        motions: Inertial factors.
         sharpness: (K, ROWS) inverse standard deviations of the priors.
         slots: (K,) number of each moving keyframe, -1 for the others.
-        camera: Camera of all keyframes.
-        T_rig_camera: Pose of the camera in the rig.
         start: Estimate at which the gauge is held.
         huber: Threshold of Huber's cost.
     """

@@ -21,10 +21,8 @@ def prior_sharpness(states: States, roles: I64, firsts: I64, settings: Settings)
     """(K, ROWS) one over the sigma of every prior; 0 where there is none.
 
     Args:
-        states: Keyframes; `still` marks those at rest.
         roles: (K,) role of each keyframe.
         firsts: (F,) keyframe in which each inertial motion starts.
-        settings: Standard deviations of the priors.
     """
     sharpness = np.zeros((len(states), ROWS))
     sharpness[roles == Role.GAUGE, 0:4] = 1.0 / GAUGE_SIGMA

@@ -99,12 +99,7 @@ class Observations:
 
 @dataclass(frozen=True, eq=False)
 class InertialFactor:
-    """Inertial motion from one keyframe to the next.
-
-    Attributes:
-        first, second: Indices of keyframes, second = first + 1.
-        preintegration: Motion between the stamps of the two.
-    """
+    """Inertial motion between the stamps of keyframes `first` and `second` = `first` + 1."""
 
     first: int
     second: int

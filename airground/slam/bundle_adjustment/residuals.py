@@ -111,8 +111,7 @@ def linearize(
 
     Args:
         keyframes, points_seen: (M,) int64 indices of each observation.
-        measured: (M, 5) x and y [px], 1 / sigma [1/px], inverse depth [1/m] or NaN, 1 / sigma
-            [m].
+        measured: (M, 5) x, y [px], 1 / sigma [1/px], inverse depth [1/m] or NaN, 1 / sigma [m].
         positions: (K, 3) positions of the rig [m].
         R_camera_map, centres: (K, 3, 3) and (K, 3) result of `camera_poses`.
         points: (P, 3) points in the map [m].

@@ -55,14 +55,9 @@ def adjust(
     observations stays; one seen once and without depth moves onto its ray.
 
     Args:
-        states: K keyframes in order of time.
         roles: (K,) `Role` of each.
         points: (P, 3) points in the map [m].
-        observations: Observations of the points in the keyframes.
         inertial: Motions between neighbouring keyframes; the map's z axis must then point up.
-        camera: Camera of all keyframes.
-        T_rig_camera: Pose of the camera in the rig.
-        settings: Steps, robustness, priors.
 
     Returns:
         The optimum, or as near as the allowed steps came. The cost never rises.
@@ -157,10 +152,8 @@ def solve(equations: NormalEquations, damping: float) -> F64 | None:
 
 
 def _reduce(equations: NormalEquations, damping: float) -> tuple[F64, F64, F64, F64] | None:
-    """Cholesky factor and gradient of the poses alone, Z and z of `eliminate_chain`.
-
-    Overwrites the equations. None where the matrix is not positive definite.
-    """
+    """Cholesky factor and gradient of the poses alone, Z and z of `eliminate_chain`; None where not
+    positive definite. Overwrites the equations."""
     poses, chain = equations.poses, equations.chain
     width = len(poses)
     # An unknown that nothing touches stays where it is.

@@ -29,12 +29,7 @@ RATIO = 0.85
 
 @dataclass(frozen=True, eq=False)
 class Described:
-    """Pixels of one image and what is around them.
-
-    Attributes:
-        pixels: (n, 2) pixels.
-        descriptors: (n, 4) uint64 descriptors of 256 bits.
-    """
+    """Pixels (n, 2) of one image and their (n, 4) uint64 descriptors of 256 bits."""
 
     pixels: F64
     descriptors: U64
@@ -45,12 +40,7 @@ class Described:
 
 
 def describe(image: U8, pixels: Floats) -> Described:
-    """ORB descriptors at pixels of a grey image.
-
-    Args:
-        image: (height, width) grey image.
-        pixels: (n, 2) pixels inside the image.
-    """
+    """ORB descriptors at (n, 2) pixels inside a (height, width) grey image."""
     size = (round(image.shape[1] / SCALE), round(image.shape[0] / SCALE))
     small = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
     pixels = np.asarray(pixels, np.float64).reshape(-1, 2)
@@ -105,15 +95,8 @@ def hamming(a: U64, b: U64) -> int:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def match(query: U64, known: U64) -> tuple[I64, I64]:
-    """Pairs of rows that are nearest to each other and clearly nearer than the next.
-
-    Args:
-        query: (n, 4) descriptors.
-        known: (m, 4) descriptors, of places apart from each other.
-
-    Returns:
-        Rows in `query` and in `known`, each at most once.
-    """
+    """Rows in `query` (n, 4) and `known` (m, 4) nearest to each other and clearly nearer than the
+    next, each at most once. The known descriptors are of places apart from each other."""
     n, m = len(query), len(known)
     nearest, distance = np.full(n, -1), np.full(n, 257)
     row_of, best_of = np.full(m, -1), np.full(m, 257)
@@ -142,13 +125,8 @@ def match(query: U64, known: U64) -> tuple[I64, I64]:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def votes(query: U64, known: U64, starts: I64) -> I64:
-    """How many query descriptors have a likeness in each group of known ones.
-
-    Args:
-        query: (n, 4) descriptors.
-        known: (m, 4) descriptors, group after group.
-        starts: (g + 1,) index at which each group begins, and m.
-    """
+    """(g,) number of query descriptors (n, 4) with a likeness in each group of known ones (m, 4);
+    `starts` (g + 1,) holds the index at which each group begins, and m."""
     counts = np.zeros(len(starts) - 1, np.int64)
     for g in range(len(counts)):
         for i in range(len(query)):

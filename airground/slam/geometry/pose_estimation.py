@@ -32,8 +32,7 @@ class PoseFit:
     Attributes:
         T_map_camera: Fitted pose.
         inliers: (N,) bool, whether a point's pixel agrees with the pose.
-        rms_px: Root mean square distance of the inliers' pixels to their points; NaN
-            without inliers.
+        rms_px: Root mean square reprojection error of the inliers [px]; NaN without inliers.
         covariance: (6, 6) covariance of the error in the map's axes: position [m], then rotation
             vector of estimate times inverse truth [rad]. NaN where inliers and priors leave a
             direction open.
@@ -73,7 +72,6 @@ def estimate_pose(
         points_map: (N, 3) points in the map [m].
         pixels: (N, 2) pixels of the points in the image.
         sigmas_px: (N,) standard deviation of the pixels per axis [px].
-        camera: Camera of the image.
         T_map_camera_start: First guess, and the mean of the priors.
         inverse_depths: (N,) measured inverse depths [1/m], NaN without one; None without any.
         inverse_depth_sigmas: (N,) standard deviation of the inverse depths [1/m].
@@ -240,9 +238,7 @@ def _huber_cost(square: float, huber: float) -> float:
 @njit(cache=True, nogil=True, error_model="numpy")
 def _row(row: F64, R: F64, d0: float, d1: float, d2: float, a: float, b: float, c: float) -> None:
     """Derivative of a residual whose derivative by the point in the camera is (a, b, c).
-
-    The point R^T (X - p) moves by -R^T with p and by R^T hat(X - p) with a left turn.
-    """
+    The point R^T (X - p) moves by -R^T with p and by R^T hat(X - p) with a left turn."""
     n0 = R[0, 0] * a + R[0, 1] * b + R[0, 2] * c
     n1 = R[1, 0] * a + R[1, 1] * b + R[1, 2] * c
     n2 = R[2, 0] * a + R[2, 1] * b + R[2, 2] * c

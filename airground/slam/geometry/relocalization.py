@@ -35,12 +35,7 @@ SIGMA_PX = 1.5
 
 @dataclass(frozen=True, eq=False)
 class Matches:
-    """Map points recognized in an image.
-
-    Attributes:
-        point_ids: (n,) int64 numbers of the points.
-        pixels: (n, 2) pixels of the points in the image, good to 1 to 2 px.
-    """
+    """Map points (n,) recognized in an image and their pixels (n, 2), good to 1 to 2 px."""
 
     point_ids: I64
     pixels: F64
@@ -52,13 +47,7 @@ class Matches:
 
 @dataclass(frozen=True, eq=False)
 class Relocalization:
-    """The pose of an image in the map.
-
-    Attributes:
-        keyframe_id: Number of the keyframe with the matches.
-        fit: Pose in the map; `fit.inliers` are over `matches`.
-        matches: Map points of the keyframe in the image.
-    """
+    """The pose of an image in the map by one keyframe; `fit.inliers` are over `matches`."""
 
     keyframe_id: int
     fit: PoseFit
@@ -76,14 +65,7 @@ class KeyframeIndex:
         return len(self._point_ids)
 
     def add(self, keyframe_id: int, image: U8, point_ids: I64, pixels: Floats) -> None:
-        """Remember a keyframe; one added before under the same number is replaced.
-
-        Args:
-            keyframe_id: Number of the keyframe.
-            image: (height, width) grey image.
-            point_ids: (n,) numbers of the map points in the image.
-            pixels: (n, 2) pixels of these points.
-        """
+        """Remember a keyframe by map points (n,) at pixels (n, 2); replaces its earlier entry."""
         self._point_ids[keyframe_id] = np.array(point_ids, np.int64)
         self._descriptors[keyframe_id] = describe(image, pixels).descriptors
 
@@ -92,12 +74,8 @@ class KeyframeIndex:
         del self._point_ids[keyframe_id], self._descriptors[keyframe_id]
 
     def alike(self, query: Described, among: list[int] | None = None) -> list[int]:
-        """The keyframes most like an image, best first.
-
-        Args:
-            query: The image's corners, strongest first.
-            among: Keyframes to choose from; all by default.
-        """
+        """The keyframes most like an image, best first, among some or (None) all.
+        The query's corners come strongest first."""
         ids = list(self._point_ids) if among is None else among
         if not ids:
             return []
@@ -105,10 +83,7 @@ class KeyframeIndex:
         return [ids[i] for i in np.argsort(-counts, kind="stable")[:CANDIDATES]]
 
     def resembling(self, keyframe_id: int, among: list[int]) -> list[int]:
-        """Those of some keyframes that may show the place of another one.
-
-        Far cheaper than `find`, since nothing new is described.
-        """
+        """Keyframes of `among` that may show the place of another one; far cheaper than `find`."""
         if not among:
             return []
         corners = self._descriptors[keyframe_id]
@@ -136,8 +111,6 @@ class KeyframeIndex:
         """The pose of an image; None where no keyframe determines it with certainty.
 
         Args:
-            image: (height, width) grey image.
-            camera: Camera of the image.
             points: Function from point numbers (n,) to positions (n, 3), NaN if not mapped.
             among: Keyframes to look at; all by default.
         """
@@ -161,13 +134,8 @@ def describe_corners(image: U8) -> Described:
 
 
 def pose_from_matches(points_map: F64, pixels: F64, camera: PinholeCamera) -> PoseFit | None:
-    """The pose that enough matches agree on, over enough of the image; None without one.
-
-    Args:
-        points_map: (n, 3) map points [m].
-        pixels: (n, 2) matched pixels, some of them wrong.
-        camera: Camera of the image.
-    """
+    """The pose that enough matches agree on, over enough of the image; None without one. Some of
+    the n matches between `points_map` (n, 3) [m] and `pixels` (n, 2) may be wrong."""
     if len(points_map) < MIN_INLIERS:
         return None
     # OpenCV starts RANSAC's generator anew in every call: the same input, the same pose.

@@ -28,11 +28,9 @@ def translation_by_known_rotation(
     Args:
         points_map: (N, 3) points in the map [m].
         pixels: (N, 2) pixels of the points in the image.
-        camera: Camera of the image.
         R_map_camera: (3, 3) known rotation.
         threshold_px: Largest distance between a pixel and its point's projection.
         iterations: Number of samples of two matches.
-        rng: Source of the samples.
 
     Returns:
         The pose, None where no three matches agree, and (N,) the matches that agree.

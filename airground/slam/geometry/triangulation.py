@@ -56,7 +56,6 @@ def triangulate_pairs(
         T_map_a: Pose of view a, for all points or for each.
         pixels_a: (N, 2) pixels in view a.
         T_map_b, pixels_b: Pose and pixels of view b, like those of view a.
-        camera: Camera of both views.
     """
     n = len(pixels_a)
     R_a, t_a = _each(T_map_a, n)

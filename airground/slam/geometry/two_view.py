@@ -95,7 +95,6 @@ def start_from_two_views(
 
     Args:
         pixels_a, pixels_b: (N, 2) matches, wrong ones among them.
-        camera: Camera of both views.
         rng: Source of the samples where the rotation is known.
         R_a_b: (3, 3) relative rotation from the gyro; None if unknown.
         rotation_sigma: Standard deviation of that rotation per axis [rad].

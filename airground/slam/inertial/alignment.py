@@ -96,9 +96,7 @@ def align(
     Args:
         rotations: (K, 3, 3) rotations `R_v_rig` of the keyframes, K >= 4.
         centres: (K, 3) centres of the cameras, in any unit.
-        T_rig_camera: Pose of the camera in the rig.
         motions: K - 1 inertial motions between one keyframe and the next.
-        noise: Noise of the visual poses.
 
     Returns:
         The alignment; its map is turned as the first camera's x axis is.
@@ -139,7 +137,6 @@ def refine_scale(
     Args:
         rotations: (K, 3, 3) rotations `R_map_rig`, K >= 4.
         centres: (K, 3) centres of the cameras [m].
-        T_rig_camera: Pose of the camera in the rig.
         motions: K - 1 inertial motions between neighbours, None where samples are missing.
         noise: Noise of the visual poses [m], [rad].
 
@@ -169,14 +166,8 @@ def refine_scale(
 
 @dataclass
 class _State:
-    """All unknowns; the search moves them.
-
-    Attributes:
-        rotations: (K, 3, 3) `R_v_rig`.
-        vectors: (K, 4, 3) position, velocity, gyro's and accelerometer's bias, metric.
-        log_scale: Logarithm of the metres in a visual unit.
-        gravity: (3,) in the axes of v.
-    """
+    """The unknowns: (K, 3, 3) `R_v_rig`; (K, 4, 3) position, velocity, gyro's and accelerometer's
+    bias, metric; logarithm of the metres in a visual unit; (3,) gravity in the axes of v."""
 
     rotations: F64
     vectors: F64

@@ -169,7 +169,6 @@ def normal_equations(
     """The band, its border with the gradient, the shared corner, and the sum of squares.
 
     Args:
-        chain: The measurements.
         rotations: (K, 3, 3) rotations `R_v_rig`.
         vectors: (K, 4, 3) position, velocity, gyro's bias, accelerometer's bias [m].
         unit: 1 / scale: visual units in a metre.

@@ -64,11 +64,8 @@ def gyro_bias_from_rotations(chain: Chain) -> F64:
 
 
 def closed_form(chain: Chain) -> Start:
-    """Gyro's bias from rotations, then everything else from the camera centres.
-
-    Args:
-        chain: Chain of at least four keyframes, all linked.
-    """
+    """Gyro's bias from rotations, then everything else from the camera centres; the chain has at
+    least four keyframes, all linked."""
     gyro_bias = gyro_bias_from_rotations(chain)
     pieces, times = _pieces(chain.durations)
     speeds, path, speeds_by_bias, path_by_bias = _inertial_path(chain, gyro_bias, pieces)

@@ -15,10 +15,8 @@ from airground.slam.inertial.preintegration import Preintegration
 
 
 def join(first: Preintegration, second: Preintegration) -> Preintegration:
-    """The motion from the start of `first` to the end of `second`, which begins at its end.
-
-    It is free of the biases of `first`; those of `second` are brought there to first order.
-    """
+    """The motion from the start of `first` to the end of `second`, which begins where `first` ends.
+    Free of the biases of `first`; those of `second` are brought there to first order."""
     turned, sped, moved = second.corrected(first.gyro_bias, first.accelerometer_bias)
     R, t = first.rotation, second.duration_s
     # What an error of the first motion's rotation, velocity and position does at the end.

@@ -116,11 +116,7 @@ class Preintegration:
 
 
 class ImuBuffer:
-    """Inertial samples as they come, and the motion between any two times among them.
-
-    Args:
-        noise: Noise of the sensor, for the covariance of the motions.
-    """
+    """Inertial samples as they come, and the motion between any two times among them."""
 
     def __init__(self, noise: ImuNoise) -> None:
         self._noise = noise
@@ -175,10 +171,8 @@ class ImuBuffer:
         self._start, self._end = 0, len(self)
 
     def covers(self, start_ns: int, end_ns: int) -> bool:
-        """Whether samples reach from `start_ns` to `end_ns`; holes inside are not looked for.
-
-        The nearest sample may be held for `MAX_HELD_S` beyond either end.
-        """
+        """Whether samples reach from `start_ns` to `end_ns`; holes inside are not looked for. The
+        nearest sample may be held for `MAX_HELD_S` beyond either end."""
         if not len(self):
             return False
         held = int(MAX_HELD_S * 1e9)

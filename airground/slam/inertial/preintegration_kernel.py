@@ -50,11 +50,8 @@ def _turned_force(rotation: F64, force: F64, out: F64) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _propagate(covariance: F64, turn: F64, lever: F64, dt: float, rows: F64, lean: F64) -> None:
-    """covariance <- F covariance F^T for the 9 x 9 transition F of one step.
-
-    F = [turn^T 0 0; dt lever, 1, 0; dt^2/2 lever, dt, 1]. It is applied to the rows twice,
-    with a transpose in between.
-    """
+    """covariance <- F covariance F^T, by F on the rows twice with a transpose in between, for
+    one step's F = [turn^T 0 0; dt lever, 1, 0; dt^2/2 lever, dt, 1]."""
     turn_back = turn.T
     for _ in range(2):
         _product(turn_back, covariance[:3], rows)
@@ -74,11 +71,8 @@ def _propagate(covariance: F64, turn: F64, lever: F64, dt: float, rows: F64, lea
 def _add_noise(
     covariance: F64, jacobian: F64, tilt: F64, dt: float, gyro: float, force: float
 ) -> None:
-    """Add the white noise of one step; `gyro` and `force` are squared densities.
-
-    Both ends of the step share its noise, so that a run of steps has the density's variance.
-    Turning the force's noise, alike on all axes, does not change it.
-    """
+    """Add the white noise of one step, shared by both its ends, with squared densities `gyro` and
+    `force`. Turning the force's noise, alike on all axes, does not change it."""
     for i in range(3):
         for j in range(3):
             turned, swept, leant = 0.0, 0.0, 0.0
@@ -153,7 +147,6 @@ def _add_step(
     """Add one step to velocity, position and their Jacobians.
 
     Args:
-        velocity, position, jacobians: The sums.
         dt: Length of the step [s].
         force: (3,) mean force.
         leant, turned_back: (3, 3) lever and transposed turn, times the rotation's Jacobian.

@@ -44,13 +44,8 @@ MEMORY = 100
 
 
 class ScaleFilter:
-    """Scale and gravity of a visual map, image by image.
-
-    Args:
-        T_rig_camera: Pose of the camera in the rig (the IMU).
-        noise: Noise of the visual poses, independent from image to image.
-        guess: Metres in a visual unit, only to weigh the priors.
-    """
+    """Scale and gravity of a visual map, image by image; noise is independent between images, and
+    `guess` [metres in a visual unit] only weighs the priors."""
 
     def __init__(self, T_rig_camera: SE3, noise: VisualNoise, guess: float = 1.0) -> None:
         self._lever = T_rig_camera.translation

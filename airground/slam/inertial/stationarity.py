@@ -47,10 +47,6 @@ def at_rest(samples: ImuSamples, noise: ImuNoise) -> Rest | None:
 
     Only the spread of the samples is decisive: a hovering robot sways and a flying one shakes,
     while the mean is the same at rest and in even motion. One second of samples suffices.
-
-    Args:
-        samples: Samples of about the last second.
-        noise: Noise of the sensor.
     """
     if len(samples.stamps_ns) < MIN_SAMPLES:
         return None
