@@ -76,11 +76,7 @@ class Accepted(Part):
     def of(
         cls, measured: Measured, git_revision: str, reason: str, before: Accepted | None, on: date
     ) -> Accepted:
-        """Accept figures; the history of `before` is kept.
-
-        Raises:
-            InputError: The reason is empty.
-        """
+        """Accept figures and keep the history of `before`; raises InputError without a reason."""
         if not reason.strip():
             raise InputError("--reason: say why these figures are right; the file keeps it")
         decision = Acceptance(
@@ -109,11 +105,8 @@ class Accepted(Part):
         )
 
     def measured(self) -> Measured:
-        """The accepted figures as measured values.
-
-        Raises:
-            InputError: This version watches other metrics.
-        """
+        """The accepted figures as measured values; raises InputError if this version watches other
+        metrics."""
         watched = [metric.name for metric in WATCHED]
         for name in [*watched, *self.metrics]:
             if name not in self.metrics or name not in watched:
@@ -144,11 +137,8 @@ class Accepted(Part):
 
     @classmethod
     def read(cls, path: Path) -> Accepted:
-        """Read and check accepted figures.
-
-        Raises:
-            InputError: The file is missing, no JSON, or of another schema.
-        """
+        """Read and check accepted figures; raises InputError if the file is missing, no JSON, or of
+        another schema."""
         return read_checked(cls, path, "accepted figures")
 
 

@@ -47,19 +47,14 @@ class Claims:
 
 def localization_claims(table: ResultTable) -> dict[str, Claims]:
     """Claims of a position by case, `ALL` last (of one condition); one per aerial map.
-
     Where there is a place to find, a claim is wrong if it is off by more than `LOCATED_M` in the
-    horizontal plane; elsewhere every claim is wrong.
-    """
+    horizontal plane; elsewhere every claim is wrong."""
     return _by_case(table, samples.claimed, samples.claimed_wrongly, "converged")
 
 
 def refinement_claims(table: ResultTable) -> dict[str, Claims]:
-    """Accepted refinements by case, `ALL` last (of one condition); one per trial.
-
-    Where there is a place to find, one that is no good pose (`is_good_pose`) is wrong; elsewhere
-    every one is.
-    """
+    """Accepted refinements by case, `ALL` last (of one condition); one per trial. Where there is a
+    place to find, one that is no good pose (`is_good_pose`) is wrong; elsewhere every one is."""
     return _by_case(table, samples.refined("accepted"), samples.refined_wrongly, "accepted")
 
 
@@ -133,9 +128,7 @@ class Localizations:
 
     def rank_correlation(self) -> float:
         """Spearman's, of spread and error: 1 where a larger spread always means a larger error.
-
-        NaN for fewer than three localizations, or where one of both never changes.
-        """
+        NaN for fewer than three localizations, or where one of both never changes."""
         if len(self) < 3 or np.ptp(self.error_m) == 0 or np.ptp(self.spread_m) == 0:
             return float("nan")
         return float(spearmanr(self.spread_m, self.error_m).statistic)

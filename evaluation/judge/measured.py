@@ -33,11 +33,8 @@ class Measured:
 
     @classmethod
     def of(cls, table: ResultTable, condition: Condition | None = None) -> Measured:
-        """The watched metrics of a table under one condition, by default its first.
-
-        Raises:
-            InputError: Nothing was measured under the condition.
-        """
+        """The watched metrics under one condition, by default the table's first; raises InputError
+        if nothing was measured under it."""
         if len(table) == 0:
             raise InputError("results: the table is empty")
         chosen = condition or table.conditions()[0]
@@ -67,9 +64,7 @@ def suite_of(everyone: list[Flight]) -> str:
 
 def figure(metric: Metric, samples: Samples) -> float:
     """The one number of a metric: the median of the flights' medians, or mean of their shares.
-
-    NaN where nothing was measured.
-    """
+    NaN where nothing was measured."""
     per_flight = [flight_value(metric, values) for values in samples.values() if values]
     if not per_flight:
         return float("nan")

@@ -89,9 +89,7 @@ def localization(metric: str, iteration: int) -> Take:
 
 def located(iteration: int, limit_m: float, limit_deg: float = np.inf) -> Take:
     """1 where the errors of position and heading are within their limits, else 0.
-
-    Without measured headings, a limited heading has no values.
-    """
+    Without measured headings, a limited heading has no values."""
     off_m, off_deg = localization("error_m", iteration), localization("error_deg", iteration)
 
     def take(table: ResultTable) -> pd.Series:

@@ -143,11 +143,8 @@ class Summary(Part):
 
     @classmethod
     def read(cls, path: Path) -> Summary:
-        """Read and check a summary.
-
-        Raises:
-            InputError: The file is missing, no JSON, or breaks the contract.
-        """
+        """Read and check a summary; raises InputError if the file is missing, no JSON, or breaks
+        the contract."""
         return read_checked(cls, path, "summary")
 
 

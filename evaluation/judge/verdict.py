@@ -165,10 +165,8 @@ def paired_differences(
     metric: Metric, before: Samples, after: Samples
 ) -> tuple[NDArray[np.float64], bool]:
     """(N,) after minus before, and whether each is one flight's; else each is one trial's.
-
-    Trials are paired in their order; one that only one side has failed on the other. Some
-    flight must have a value.
-    """
+    Trials are paired in their order; one that only one side has failed on the other. Some flight
+    must have a value."""
     flights = []
     for flight in sorted(before.keys() | after.keys()):
         pairs = list(

@@ -69,10 +69,8 @@ class CloseUp:
         self, tracked: dict[str, Tracked], augmented: AugmentedMap, match_seed: int | None = None
     ) -> Showcase | None:
         """The data gathered, after the run; None if no aerial map was located.
-
         `match_seed` is that of the prior pose that chooses ground views for matches by ASIFT; None
-        leaves out the matches, which take seconds.
-        """
+        leaves out the matches, which take seconds."""
         if self._first is None:
             return None
         sighting, heights = self._first

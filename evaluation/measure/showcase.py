@@ -115,11 +115,8 @@ class Showcase:
 
     @classmethod
     def load(cls, folder: Path) -> Showcase:
-        """Read back what `save` wrote.
-
-        Raises:
-            InputError: A file is missing, damaged or of another kind.
-        """
+        """Read back what `save` wrote; raises InputError if a file is missing, damaged or of
+        another kind."""
         path = folder / ARRAYS
         try:
             with np.load(path, allow_pickle=False) as stored:
@@ -139,9 +136,7 @@ class Showcase:
 
 def _flat(name: str, value: Any) -> dict[str, NDArray]:
     """A number, a text, an array, or a dataclass or tuple of these, as arrays by dotted name.
-
-    `surface.camera.fx` is such a name. None has no entry.
-    """
+    `surface.camera.fx` is such a name. None has no entry."""
     if value is None:
         return {}
     if is_dataclass(value):

@@ -55,11 +55,8 @@ class DropList(_Part):
 
     @classmethod
     def read(cls, path: Path, recording: Recording) -> Self:
-        """Read a list that was made with this recording.
-
-        Raises:
-            InputError: The file is missing, malformed, or of another recording.
-        """
+        """Read a list that was made with this recording; raises InputError if the file is missing,
+        malformed, or of another recording."""
         made = read_checked(cls, path, "list of drops")
         if made.recording != fingerprint(recording):
             raise InputError(

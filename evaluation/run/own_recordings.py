@@ -198,10 +198,8 @@ def run_pair(pair: Pair, setup: Setup, seed: int, onlookers: Sequence[Onlooker] 
 
 def write_pair(folder: Path, pair: Pair, setup: Setup, result: PairResult) -> dict[str, Any]:
     """Write the map, the trajectories and `summary.json`; returns the summary.
-
     Each robot leaves `ROBOT.tum` and `ROBOT_live.tum`; `T_ground_mav.tum` has the accepted
-    alignments by the stamps of their surfaces.
-    """
+    alignments by the stamps of their surfaces."""
     augmented, events = result.augmented, result.events
     write_ply(folder / "augmented_map.ply", augmented.cloud_ground, augmented.sources)
     accepted = [alignment for alignment in events.alignments if alignment.accepted]

@@ -94,11 +94,8 @@ class RobotProcess(AbstractContextManager["RobotProcess"]):
         return self._process.is_alive()
 
     def wait_until_ready(self) -> None:
-        """Return when the process has compiled and could track the first image.
-
-        Raises:
-            AirgroundError: The task is refused, or the process died.
-        """
+        """Return when the process has compiled and could track the first image; raises
+        AirgroundError if the task is refused, or the process died."""
         self.receive()
 
     def start(self, order: object = None) -> None:

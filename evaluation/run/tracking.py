@@ -145,10 +145,8 @@ def write_paths(
     folder: Path, name: str, recording: RobotRecording, log: FrontEndLog, final: Trajectory | None
 ) -> None:
     """Write `NAME.tum` (final poses) and `NAME_live.tum` (poses as first given), where any.
-
     Poses are those of `recording.pose_frame`, the frame whose truth the publisher states, so that
-    `evo_ape tum` compares the files as they are.
-    """
+    `evo_ape tum` compares the files as they are."""
     T_camera_pose = recording.T_pose_camera.inverse()
     for file, path in ((name, final), (f"{name}_live", live_path(log))):
         if path is not None:

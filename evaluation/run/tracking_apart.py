@@ -168,11 +168,8 @@ class TrackingApart(AbstractContextManager["TrackingApart"]):
             process.wait_until_ready()
 
     def frames(self) -> Iterator[TrackedFrame]:
-        """As `Tracking.frames`.
-
-        Raises:
-            AirgroundError: An image cannot be read, or a process died.
-        """
+        """As `Tracking.frames`; raises AirgroundError if an image cannot be read, or a process
+        died."""
         for process in self._processes.values():
             process.start()
         streams = [self._frames(robot) for robot in self._processes]

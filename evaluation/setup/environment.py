@@ -75,9 +75,7 @@ def _choose_renderer() -> None:
 
 def prepare_worker(threads: int) -> None:
     """Set the environment of a worker process; with one thread, bind it to one core.
-
-    What libraries print goes to stderr, away from the results on stdout.
-    """
+    What libraries print goes to stderr, away from the results on stdout."""
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     if threads == 1:
         os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})

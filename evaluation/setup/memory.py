@@ -30,9 +30,7 @@ def peak_memory_mib() -> float:
 
 def resident_mib(processes: Iterable[int]) -> float | None:
     """Memory that processes (PID) hold now, shared pages counted once [MiB].
-
-    None where the system does not count it.
-    """
+    None where the system does not count it."""
     try:
         return sum(psutil.Process(pid).memory_full_info().pss for pid in processes) / 2**20
     except (psutil.Error, AttributeError):  # a process has ended; a system without this figure
@@ -41,9 +39,7 @@ def resident_mib(processes: Iterable[int]) -> float | None:
 
 def files_mib() -> float:
     """Files in this process's memory, mostly libraries, which other processes share [MiB].
-
-    0 where the system does not count them.
-    """
+    0 where the system does not count them."""
     return _status_mib("RssFile") or 0.0
 
 

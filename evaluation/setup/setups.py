@@ -132,9 +132,7 @@ def with_localization(config: Config, **changes: object) -> Config:
 
 def with_companions(primary: Setup, few: bool = False) -> list[Setup]:
     """The primary setup, then what the report shows beside it.
-
-    `few` leaves only the true poses, and the paper's constants with both readings of its sigma.
-    """
+    `few` leaves only the true poses, and the paper's constants with both readings of its sigma."""
     best, published = Config(), paper()
     minmax = with_localization(published, sigma_units="minmax")
     companions = [

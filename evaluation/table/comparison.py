@@ -114,9 +114,7 @@ def median(values: NDArray[np.float64]) -> float:
 
 def adjusted(p_values: Sequence[float]) -> list[float]:
     """Holm's step-down adjustment: below alpha, the family's error stays below alpha.
-
-    Nothing is assumed of how the tests depend on each other.
-    """
+    Nothing is assumed of how the tests depend on each other."""
     order = np.argsort(p_values, kind="stable")
     made = np.empty(len(p_values))
     largest = 0.0
@@ -166,10 +164,8 @@ def _medians(samples: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _effect(value: float, draws: NDArray[np.float64], n: int, p: float) -> Effect:
     """With the expanded percentile interval, which few observations need.
-
-    Resampling N observations spreads sqrt((N - 1) / N) too little, and neglects that the
-    spread is itself estimated (Hesterberg, The American Statistician 69(4), 2015).
-    """
+    Resampling N observations spreads sqrt((N - 1) / N) too little, and neglects that the spread is
+    itself estimated (Hesterberg, The American Statistician 69(4), 2015)."""
     reach = stats.t.ppf(0.975, n - 1) * np.sqrt(n / (n - 1))
     tail = float(stats.norm.cdf(-reach))
     ordered = np.sort(draws)

@@ -57,11 +57,8 @@ def with_failures(values: ArrayLike) -> NDArray[np.float64]:
 
 
 def quantile(values: ArrayLike, q: float) -> float:
-    """Linearly interpolated quantile that may be infinite; NaN of no values.
-
-    numpy interpolates inf - inf to NaN; here a quantile between a number and a failure
-    is a failure.
-    """
+    """Linearly interpolated quantile that may be infinite; NaN of no values. numpy interpolates inf
+    - inf to NaN; here a quantile between a number and a failure is a failure."""
     ordered = np.sort(with_failures(values))
     if len(ordered) == 0:
         return float("nan")
@@ -81,9 +78,7 @@ def quantiles(values: ArrayLike) -> Quantiles:
 
 def median_interval(values: ArrayLike, rng: np.random.Generator, resamples: int = 2000) -> Interval:
     """The median with a 95 % percentile bootstrap interval.
-
-    Values are taken as independent; trials on the same recording are not quite.
-    """
+    Values are taken as independent; trials on the same recording are not quite."""
     array = with_failures(values)
     n = len(array)
     if n == 0:

@@ -119,9 +119,7 @@ def _random_walk(
 
 def _scaled(error: NDArray, path: NDArray, rms_m: float) -> NDArray[np.float64]:
     """`error`, scaled so that the drifted path is off by `rms_m` after SE3 alignment.
-
-    The first pose stays exact, as in every SLAM: its map starts there.
-    """
+    The first pose stays exact, as in every SLAM: its map starts there."""
     if rms_m == 0.0:
         return np.zeros_like(path)
     error = error - error[0]

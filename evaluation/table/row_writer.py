@@ -49,9 +49,7 @@ class RowWriter:
         origin: str = "",
     ) -> None:
         """A filter's belief after one aerial map, and its error (Fig. 11, 12).
-
-        `origin` states how it was made, where not by the pipeline itself.
-        """
+        `origin` states how it was made, where not by the pipeline itself."""
         add = partial(self.add, "localization", sequence=sequence, iteration=iteration)
         add("error_m", error.horizontal_m, "m", note=origin)
         add("error_deg", error.rotation_deg, "deg")

@@ -103,11 +103,8 @@ class ResultTable:
 
     @classmethod
     def read(cls, path: Path) -> ResultTable:
-        """Read `results.parquet`.
-
-        Raises:
-            InputError: The file is missing, no parquet, or lacks a column.
-        """
+        """Read `results.parquet`; raises InputError if the file is missing, no parquet, or lacks a
+        column."""
         try:
             frame = pd.read_parquet(path)
         except (OSError, ValueError) as error:
@@ -144,11 +141,8 @@ class ResultTable:
         return ResultTable(self.frame[~self.frame["stage"].isin(list(stages))])
 
     def without_controls(self) -> ResultTable:
-        """Without the control scenes, unless there are no others.
-
-        Where there is nothing to find, being lost is no failure; such scenes are judged by
-        `controls` instead.
-        """
+        """Without the control scenes, unless there are no others. Where there is nothing to find,
+        being lost is no failure; such scenes are judged by `controls` instead."""
         others = [scene for scene in self.scenes() if scene not in CONTROL_SCENES]
         return self.of_scenes(others) if others else self
 
@@ -165,10 +159,8 @@ class ResultTable:
 
     def sequences(self, metric: str) -> pd.DataFrame:
         """A localization metric per sequence (rows) and iteration (columns 1, 2, ...).
-
-        There is a row for every sequence in the table, and a column for every iteration up to
-        that of the longest sequence; what was not measured is NaN.
-        """
+        There is a row for every sequence in the table, and a column for every iteration up to that
+        of the longest sequence; what was not measured is NaN."""
         frame = self.frame[self.frame["stage"] == "localization"]
         keys = frame[SEQUENCE_KEYS].drop_duplicates()
         last = frame["iteration"].max()

@@ -37,9 +37,7 @@ _RECORD = np.dtype(
 
 class AnswerLog(Sequence[TrackedPose]):
     """Answers in order of time, without their corners; each is made anew when it is asked for.
-
-    As objects they take 3.3 kB each, or 120 MB in ten minutes of two robots.
-    """
+    As objects they take 3.3 kB each, or 120 MB in ten minutes of two robots."""
 
     def __init__(self, answers: Iterable[TrackedPose] = ()) -> None:
         self._chunks: list[NDArray[np.void]] = []

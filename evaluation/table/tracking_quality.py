@@ -25,9 +25,7 @@ DRAWN_EVERY_NS = 100_000_000
 
 def add_tracking(out: RowWriter, tracked: Tracked, true_pose: Callable[[int], SE3]) -> None:
     """Write all that is measured of a robot's poses (Fig. 9, 10).
-
-    A robot that was never tracked has errors without a number, which count as failures.
-    """
+    A robot that was never tracked has errors without a number, which count as failures."""
     robot, front_end = tracked.robot, tracked.front_end
     ways = (("", front_end.live_poses()), ("final_", tracked.final_poses()))
     for prefix, poses in ways:
@@ -102,12 +100,9 @@ class Consistency:
 def consistency(
     answers: Sequence[TrackedPose], true_pose: Callable[[int], SE3]
 ) -> tuple[Consistency, Consistency]:
-    """Consistency of the live position (3 degrees of freedom) and of the live pose (6).
-
-    A map is free in its origin and heading only, so the truth is aligned by those four over
-    all images: scale error and tilt count as errors. Images without a usable covariance are
-    left out.
-    """
+    """Consistency of the live position (3 degrees of freedom) and of the live pose (6). A map is
+    free in its origin and heading only, so the truth is aligned by those four over all images:
+    scale error and tilt count as errors. Images without a usable covariance are left out."""
     known = [
         (answer.T_map_camera, true_pose(answer.stamp_ns), answer.covariance)
         for answer in answers

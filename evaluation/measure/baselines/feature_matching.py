@@ -123,9 +123,7 @@ def _features(
 
 def _distinct(aerial_px: NDArray, ground_px: NDArray) -> NDArray[np.int64]:
     """Indices of the matches (N, 2) between other pixels than those before them.
-
-    ASIFT's simulated views detect one corner many times, which would look like agreement.
-    """
+    ASIFT's simulated views detect one corner many times, which would look like agreement."""
     places = np.floor(np.hstack([aerial_px, ground_px]) / SAME_PLACE_PX).astype(np.int64)
     _, first = np.unique(places, axis=0, return_index=True)
     return np.sort(first)

@@ -33,9 +33,7 @@ SCORED_AT_ONCE = 256
 
 def fpfh_ransac_icp(given: Given) -> Answer:
     """Match features both ways, take the possible motion with most inliers, and refine by ICP.
-
-    RANSAC is implemented here: Open3D's result depends on the number of threads.
-    """
+    RANSAC is implemented here: Open3D's result depends on the number of threads."""
     refusal = too_few_points(given)
     if refusal:
         return Answer(None, refusal)
@@ -80,10 +78,8 @@ def ransac(
     rng: np.random.Generator,
 ) -> SE3 | None:
     """T_target_source that brings most source points near their target points (N, 3) [m].
-
     It is fitted to its inliers; None where no triple of points gives a motion with a `possible`
-    rotation, of an array (B, 3, 3).
-    """
+    rotation, of an array (B, 3, 3)."""
     triples = rng.integers(0, len(source), (SAMPLES, 3))
     alike = _edges(source[triples]), _edges(target[triples])
     similar = np.minimum(*alike) >= EDGE_SIMILARITY * np.maximum(*alike)

@@ -30,9 +30,7 @@ def height_maps(given: Given, **localization: object) -> HeightMapPair | None:
 
 def answer_at(given: Given, maps: HeightMapPair, position: NDArray) -> Answer:
     """The answer that puts the MAV's camera at (x, y) in `ground` [m].
-
-    The height follows from the mean difference over the overlap (Delta z of Sec. VI-A).
-    """
+    The height follows from the mean difference over the overlap (Delta z of Sec. VI-A)."""
     offset = float(overlay_at(maps.aerial, maps.ground, position[None]).height_offsets()[0])
     estimate = np.array([*position, maps.turn])
     camera_mav = given.sighting.surface.T_mav_camera.translation
@@ -41,9 +39,7 @@ def answer_at(given: Given, maps: HeightMapPair, position: NDArray) -> Answer:
 
 def lowest_cost(given: Given, cost: str, min_relief_m: float) -> Answer:
     """The position of lowest cost ("zmssd" or "ncc") in the search region (Eq. 3), always claimed.
-
-    `min_relief_m` is the least standard deviation of both maps' heights in the correlation.
-    """
+    `min_relief_m` is the least standard deviation of both maps' heights in the correlation."""
     maps = height_maps(given, cost=cost, min_relief_m=min_relief_m)
     if maps is None:
         return NO_HEADING
@@ -71,10 +67,8 @@ def zmssd_search(given: Given) -> Answer:
 
 def phase_correlation(given: Given) -> Answer:
     """Register the height maps as images with holes, by scikit-image.
-
-    Its overlap rule is a share of the largest overlap of any offset. An offset outside of
-    the search region is not claimed; any other is.
-    """
+    Its overlap rule is a share of the largest overlap of any offset. An offset outside of the
+    search region is not claimed; any other is."""
     from skimage.registration import phase_cross_correlation
 
     maps = height_maps(given)

@@ -32,10 +32,8 @@ above."""
 
 def kiss_matcher_icp(given: Given) -> Answer:
     """Match Faster-PFH features, prune them by k-core, solve robustly, settle by ICP.
-
-    Its solver Quatro assumes that both maps are level. Its own thinning is not used: the order
-    of its points depends on the threads' speed, and the result on the order.
-    """
+    Its solver Quatro assumes that both maps are level. Its own thinning is not used: the order of
+    its points depends on the threads' speed, and the result on the order."""
     refusal = too_few_points(given)
     if refusal:
         return Answer(None, refusal)
@@ -67,10 +65,8 @@ def _matcher() -> KISSMatcher:
 @cache
 def _bind_to_one_thread() -> None:
     """Use it once while this process has one core: TBB then keeps one thread for it.
-
     With more, ties are resolved by the threads' speed: of 80 runs over the same clouds on a busy
-    machine two differed by millimetres.
-    """
+    machine two differed by millimetres."""
     cores = {pid: os.sched_getaffinity(pid) for pid in (0, os.getpid())}
     cloud = list(np.random.default_rng(0).uniform(-1, 1, (500, 3)).astype(np.float32))
     try:

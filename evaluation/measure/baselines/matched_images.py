@@ -51,9 +51,7 @@ def match_images(
     recording: Recording, ground_poses: list[tuple[int, SE3]], sighting: Sighting, prior: SE3
 ) -> MatchedImages | None:
     """Match one sighting's image by ASIFT; None where no ground view looks at the surface.
-
-    `prior` is an approximate T_ground_mav, which selects the ground views.
-    """
+    `prior` is an approximate T_ground_mav, which selects the ground views."""
     aerial = aerial_view(recording, sighting)
     views = GroundViews(recording, ground_poses).nearest(sighting, prior)
     if not views:

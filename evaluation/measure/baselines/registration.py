@@ -41,10 +41,8 @@ def _sampled(points: NDArray, voxel_m: float) -> small_gicp.PointCloud:
 
 def settled_by_icp(given: Given, start: SE3) -> Answer:
     """Point-to-plane ICP of small_gicp, at the distances of ours: first wide, then narrow.
-
     Claimed if the share of aerial points on the ground map reaches the least overlap, inside the
-    search region, with the rotation that gravity and the magnetometers give.
-    """
+    search region, with the rotation that gravity and the magnetometers give."""
     refinement = given.config.refinement
     aerial = _sampled(given.sighting.surface.cloud_mav.points, refinement.voxel_m)
     ground = _sampled(searched_ground(given), refinement.voxel_m)
@@ -71,9 +69,7 @@ def settled_by_icp(given: Given, start: SE3) -> Answer:
 
 def why_refused(given: Given, motion: SE3, share: float) -> str:
     """Reason why a registered T_ground_mav is not claimed; empty if it is.
-
-    `share` is that of the aerial points that lie on the ground map.
-    """
+    `share` is that of the aerial points that lie on the ground map."""
     least = given.config.localization.min_overlap
     if share < least:
         return f"only {share:.0%} of the aerial points lie on the ground map, {least:.0%} needed"
@@ -89,9 +85,7 @@ def why_refused(given: Given, motion: SE3, share: float) -> str:
 
 def impossible_turn(given: Given, rotations: NDArray) -> NDArray[np.float64]:
     """(N,) angle between rotations (N, 3, 3) of `mav` to `ground` and the known one [rad].
-
-    If the heading is searched or unknown, only the vertical is known.
-    """
+    If the heading is searched or unknown, only the vertical is known."""
     heading = given.sighting.heading
     if given.config.localization.heading == "search" or heading is None:
         cosines = rotations[:, 2, 2]

@@ -34,18 +34,14 @@ def aerial_view(recording: Recording, sighting: Sighting) -> View:
 @dataclass(frozen=True, eq=False)
 class GroundViews:
     """Selects the ground robot's images that show best what the MAV sees.
-
-    `poses` are stamp [ns] and T_ground_camera of the tracked images, by the robot's own SLAM.
-    """
+    `poses` are stamp [ns] and T_ground_camera of the tracked images, by the robot's own SLAM."""
 
     recording: Recording
     poses: Sequence[tuple[int, SE3]]
 
     def nearest(self, sighting: Sighting, T_ground_mav: SE3) -> tuple[View, ...]:
         """Earlier images with the most similar view of the aerial surface to the MAV's, best first.
-
-        Fewer than `VIEWS` if no others see the surface. An approximate pose of the MAV suffices.
-        """
+        Fewer than `VIEWS` if no others see the surface. An approximate pose of the MAV suffices."""
         every = max(1, len(sighting.surface.cloud_mav) // SAMPLED_POINTS)
         points = T_ground_mav @ sighting.surface.cloud_mav.points[::every]
         mav = (T_ground_mav @ sighting.surface.T_mav_camera).translation
@@ -79,10 +75,8 @@ class GroundViews:
 
 def _likeness(points: NDArray, mav: NDArray, camera: PinholeCamera, pose: SE3) -> float:
     """Similarity of a ground camera's view of the surface to the MAV's.
-
-    The mean over the points (N, 3) of the cosine between both lines of sight, 0 where the
-    point is outside the image; occlusion is not considered.
-    """
+    The mean over the points (N, 3) of the cosine between both lines of sight, 0 where the point is
+    outside the image; occlusion is not considered."""
     if len(points) == 0:
         return 0.0
     in_camera = pose.inverse() @ points

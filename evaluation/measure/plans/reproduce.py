@@ -75,9 +75,7 @@ class Plan:
 
     def stranger(self, flight: Flight) -> Flight | None:
         """The flight whose ground map is the wrong one: the same flight over the next scene.
-
-        None where no other scene holds anything to find.
-        """
+        None where no other scene holds anything to find."""
         scenes: list[Scene] = []
         for other in filter(_has_places, self.flights):
             scenes += [other.scene] if other.scene not in scenes else []

@@ -47,11 +47,8 @@ class SweepPlan:
         return points(self.varied)
 
     def units(self, point: Point) -> list[Unit]:
-        """What is measured at one point: the same seeds at each, so that points are paired.
-
-        Raises:
-            InputError: The dials cannot stand so.
-        """
+        """Units of one point, with the same seeds at each, so that points are paired; raises
+        InputError if a dial cannot have its value."""
         return [unit for scene in self.scenes for unit in self._of_scene(scene, point)]
 
     def tasks(self) -> int:

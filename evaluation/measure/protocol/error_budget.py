@@ -26,9 +26,7 @@ from sim.recording.truth import Truth
 
 def with_true_surface(sighting: Sighting, truth: Truth) -> Sighting:
     """The aerial surface is the true one in its camera's view, without holes or errors.
-
-    It is placed by the MAV's estimated pose, so that errors of poses stay.
-    """
+    It is placed by the MAV's estimated pose, so that errors of poses stay."""
     surface = sighting.surface
     T_world_camera = truth.T_world_mav_camera(surface.reference_stamp_ns)
     depth = truth.cast(surface.camera, T_world_camera)
@@ -43,9 +41,7 @@ def with_true_surface(sighting: Sighting, truth: Truth) -> Sighting:
 
 def with_true_ground_map(sighting: Sighting, truth: Truth) -> Sighting:
     """Every point of the ground map is moved to the nearest point of the true surface.
-
-    This keeps the coverage, and removes noise and drift across the surfaces.
-    """
+    This keeps the coverage, and removes noise and drift across the surfaces."""
     T_world_camera = truth.T_world_ground_camera(sighting.ground_stamp_ns)
     T_world_ground = T_world_camera @ sighting.T_ground_camera.inverse()
     points_world = (T_world_ground @ sighting.ground_cloud.points).astype(np.float32)

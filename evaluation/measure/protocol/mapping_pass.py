@@ -147,11 +147,8 @@ def map_recording(
 def localize_again(
     maps: Maps, recording: Recording, setup: Setup, seed: int, flight: int
 ) -> Localized:
-    """Beliefs and alignments for the same sightings under a setup with the same maps.
-
-    They equal those of a pass of its own (`map_recording`), since localization does not act on
-    the maps.
-    """
+    """Beliefs and alignments for the same sightings under a setup with the same maps. They equal
+    those of a pass of its own (`map_recording`), since localization does not act on the maps."""
     pipeline = pipeline_for(recording, setup, localizer_rng(seed, flight))
     localized = Localized()
     for sighting in maps.sightings:

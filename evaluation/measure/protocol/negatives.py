@@ -62,10 +62,8 @@ def add_negatives(
 
 def without_overlap(sighting: Sighting, truth: Truth) -> Sighting:
     """A sighting whose ground map lies under only `OVERLAP_LEFT` of the aerial surface.
-
     The ground map is cut along a line across the aerial surface, and the side of the ground map's
-    centre is kept, as if the robot had not driven that far yet.
-    """
+    centre is kept, as if the robot had not driven that far yet."""
     aerial = _horizontal(true_T_ground_mav(sighting, truth) @ sighting.surface.cloud_mav.points)
     cloud = sighting.ground_cloud
     ground = _horizontal(cloud.points)
@@ -112,9 +110,7 @@ def _add_case(
 
 def refine_best_guess(sighting: Sighting, config: Config, rng: np.random.Generator) -> Alignment:
     """Refine from the belief of localization, whether it claims a position or not.
-
-    No start makes a wrong alignment more likely than the place most similar to the aerial map.
-    """
+    No start makes a wrong alignment more likely than the place most similar to the aerial map."""
     localizer = MonteCarloLocalizer(config, rng)
     for _ in locate(localizer, sighting):
         pass

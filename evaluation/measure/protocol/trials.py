@@ -92,9 +92,7 @@ class RefinementTrial:
 
 def sequence_starts(sightings: int, sequences: int, length: int = SEQUENCE_LENGTH) -> list[int]:
     """Index of the first sighting of each sequence, spread evenly over a flight.
-
-    A flight with fewer aerial maps than a sequence gives one; the missing ones count as failed.
-    """
+    A flight with fewer aerial maps than a sequence gives one; the missing ones count as failed."""
     last = max(0, sightings - length)
     return sorted({round(start) for start in np.linspace(0, last, sequences)})
 

@@ -54,11 +54,8 @@ class Unit:
     stranger: Path | Flight | None = None
 
     def made_from(self) -> dict[str, Any]:
-        """Everything that the rows depend on, as JSON data.
-
-        Raises:
-            InputError: The recording is missing.
-        """
+        """Everything that the rows depend on, as JSON data; raises InputError if the recording is
+        missing."""
         setup = self.setup
         return {
             "code": code_version(),
@@ -102,9 +99,7 @@ def key_of(made_from: dict[str, Any]) -> str:
 
 def grouped(units: Iterable[Unit]) -> list[list[Unit]]:
     """Groups of units that share their maps, since rendering and mapping take most of the time.
-
-    A unit with extras is the first of its group.
-    """
+    A unit with extras is the first of its group."""
     groups: list[list[Unit]] = []
     for unit in units:
         for group in groups:
@@ -175,11 +170,7 @@ class UnitStore:
         return (self._folder / key).is_dir()
 
     def read(self, key: str) -> Finished:
-        """The results of a key.
-
-        Raises:
-            InputError: A file is damaged.
-        """
+        """The results of a key; raises InputError if a file is damaged."""
         unit = self._folder / key
         showcase = unit / SHOWCASE
         return Finished(
@@ -188,11 +179,8 @@ class UnitStore:
         )
 
     def write(self, key: str, made_from: dict[str, Any], finished: Finished) -> None:
-        """Store the results of a unit; they are on the disk when this returns.
-
-        Raises:
-            OSError: Writing failed, as on a full disk; nothing is stored then.
-        """
+        """Store the results of a unit, on the disk when this returns; raises OSError and stores
+        nothing if writing failed, as on a full disk."""
         partial = Path(tempfile.mkdtemp(prefix=_PARTIAL, dir=self._folder))
         try:
             finished.table.write(partial / ROWS)

@@ -207,11 +207,8 @@ class LiveTracking(AbstractContextManager["LiveTracking"]):
 
 
 def _report_of(process: RobotProcess) -> RobotReport | None:
-    """A robot's report; None if its process died or does not answer.
-
-    Raises:
-        AirgroundError: The robot could not go on: an image cannot be read.
-    """
+    """A robot's report, None if its process died or does not answer; raises AirgroundError if the
+    robot cannot read an image."""
     if not process.answers_within(REPORT_S):
         return None
     report: RobotReport | None = process.receive(or_none=True)
