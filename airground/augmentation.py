@@ -15,12 +15,7 @@ from airground.core.voxel_map import VoxelMap
 
 @dataclass(frozen=True, eq=False)
 class AugmentedMap:
-    """One cloud in the frame `ground` with the robot that saw each point.
-
-    Attributes:
-        cloud_ground: Cloud of all points.
-        sources: (N,) uint8, a `Source` each.
-    """
+    """One cloud in the frame `ground`, and (N,) uint8 `sources`: the robot that saw each point."""
 
     cloud_ground: PointCloud
     sources: U8
@@ -33,8 +28,7 @@ class Augmentation:
     """Gathers the aerial surfaces that were aligned, averaged over cubes of side `voxel_m`.
 
     They are kept in the MAV's own map and moved to `ground` by the newest alignment, so
-    that a better alignment improves what was added before.
-    """
+    that a better alignment improves what was added before."""
 
     def __init__(self, voxel_m: float) -> None:
         self._voxels = VoxelMap(voxel_m)

@@ -4,9 +4,7 @@
 class AirgroundError(Exception):
     """A problem that one line explains: what was wrong, where, and what would be right.
 
-    The command line prints the message without a traceback and exits non-zero. Anything
-    else that escapes is a bug.
-    """
+    The command line prints it without a traceback and exits non-zero. Anything else is a bug."""
 
 
 class InputError(AirgroundError):

@@ -1,11 +1,8 @@
 """Whether two overlaid height maps agree by more than chance.
 
-Two heaps on a floor agree over half of their area at any place, since floor lies on
-floor; so the share of agreeing cells says little. What counts is how far it exceeds the
-share that the same maps reach in wrong places: Cohen's kappa, with chance measured by
-shifting. On flat ground, on a slope, along a ridge and in a regular pattern a shift does
-not matter, and kappa is near zero there.
-"""
+The measure is Cohen's kappa: how far the share of agreeing cells exceeds the share that the same
+maps reach when shifted to wrong places. Two heaps on a floor agree over half of their area at any
+place. Kappa is near zero on flat ground, on a slope, along a ridge and in a regular pattern."""
 
 from __future__ import annotations
 
@@ -29,8 +26,7 @@ class Agreement:
 
     Attributes:
         cells: Number of cells filled in both maps.
-        share: Share of these cells whose heights differ by at most 5 cm from the median
-            difference; 0 where too few overlap.
+        share: Share of them within 5 cm of the median height difference; 0 if too few overlap.
         chance: Highest share at 16 places shifted by 0.4 m.
     """
 

@@ -1,8 +1,6 @@
 """Types of arrays, a check of their shape and type, and the kernels' fast-math flags.
 
-`F64` is an array of 64-bit floats, `U8` one of unsigned bytes, and so on; shapes stand in the
-docstrings.
-"""
+`F64` is an array of 64-bit floats, `U8` one of unsigned bytes; docstrings give the shapes."""
 
 from collections.abc import Sequence
 from typing import TypeVar

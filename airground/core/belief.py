@@ -43,8 +43,7 @@ class CostMap:
         costs: (nx, ny) float32, NaN where the overlap is too small. Low is good.
         origin: (2,) float64 [m], the u of cell [0, 0] in the frame `ground`.
         cells_per_m: Resolution.
-        heading: Turn of the frame `mav` in `ground` that it was computed for [rad]; where
-            headings were searched, that of the lowest cost.
+        heading: Turn of `mav` in `ground` [rad]; if searched, that of the lowest cost.
         cost: Kind of cost: "zmssd" [m^2] or "ncc" [1 - correlation].
     """
 

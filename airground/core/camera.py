@@ -66,8 +66,7 @@ class PinholeCamera:
     def halved(self) -> PinholeCamera:
         """The camera of the image averaged over 2 x 2 pixels.
 
-        A pixel centre at i covers 2i and 2i + 1, hence the quarter pixel.
-        """
+        A pixel centre at i covers 2i and 2i + 1, hence the quarter pixel."""
         return PinholeCamera(
             self.width // 2,
             self.height // 2,

@@ -1,8 +1,6 @@
 """What the pipeline reports, in the order in which it happens (Fig. 4).
 
-A stage yields exactly one event when it is done, so that a consumer can draw, measure or
-time it from outside. No event knows the truth.
-"""
+A stage yields exactly one event when it is done. No event holds the truth."""
 
 from __future__ import annotations
 
@@ -31,8 +29,7 @@ class MavTracked(Event):
         T_mav_camera: Pose of the camera in the MAV's map.
         covariance: (6, 6) covariance of the pose's error in the map's axes: position [m], then
             rotation vector [rad]; None where the front end has none.
-        scale_sigma: Standard deviation of the map's scale, as a share of it; None where it
-            is not estimated.
+        scale_sigma: Relative standard deviation of the map's scale; None if not estimated.
     """
 
     T_mav_camera: SE3

@@ -18,16 +18,13 @@ def make_height_map(
 ) -> HeightMap:
     """Highest point over each cell of the ground plane (Sec. VI-A).
 
-    Cell centres lie at whole multiples of the cell size, so that two maps of one
-    resolution always share a lattice.
+    Cell centres are whole multiples of the cell size: maps of one resolution share a lattice.
 
     Args:
         points: (N, 3) [m], z against gravity; points with a NaN are left out.
         cells_per_m: Resolution.
-        dilate_holes: Fill each hole by the highest of its 3 x 3 neighbours; heights that
-            were measured stay as they are.
-        window: Lowest and highest (x, y) [m] that the map covers; around all points where
-            None.
+        dilate_holes: Fill each hole by the highest of its 3 x 3 neighbours.
+        window: Lowest and highest (x, y) [m] of the map; around all points where None.
 
     Returns:
         The map in the frame of the points; one empty cell where there are no points.

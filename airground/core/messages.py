@@ -14,12 +14,9 @@ from airground.core.se3 import SE3
 
 @dataclass(frozen=True, eq=False)
 class MavImage:
-    """One image of the MAV's downward camera.
+    """One image of the MAV's downward camera: (height, width) uint8, grey.
 
-    Attributes:
-        stamp_ns: Middle of the exposure on the camera's clock [ns].
-        image: (height, width) uint8, grey.
-    """
+    `stamp_ns` is the middle of the exposure on the camera's clock [ns]."""
 
     stamp_ns: int
     image: U8
@@ -74,12 +71,7 @@ class ImuSamples:
 
 @dataclass(frozen=True, eq=False)
 class MagneticSamples:
-    """A run of magnetometer measurements in the `imu` frame.
-
-    Attributes:
-        stamps_ns: (N,) int64, strictly increasing.
-        field: (N, 3) float64 magnetic field [T].
-    """
+    """Magnetometer measurements (N, 3) float64 [T] in the `imu` frame, stamps increasing."""
 
     stamps_ns: I64
     field: F64
@@ -99,10 +91,10 @@ class ImuNoise:
     """Noise of an inertial sensor by its data sheet.
 
     Attributes:
-        gyro_noise_density: Noise density of the gyro [rad/s/sqrt(Hz)].
-        gyro_bias_walk: Random walk of the gyro's bias [rad/s^2/sqrt(Hz)].
-        accelerometer_noise_density: Noise density of the accelerometer [m/s^2/sqrt(Hz)].
-        accelerometer_bias_walk: Random walk of the accelerometer's bias [m/s^3/sqrt(Hz)].
+        gyro_noise_density: White noise [rad/s/sqrt(Hz)].
+        gyro_bias_walk: Random walk of the bias [rad/s^2/sqrt(Hz)].
+        accelerometer_noise_density: White noise [m/s^2/sqrt(Hz)].
+        accelerometer_bias_walk: Random walk of the bias [m/s^3/sqrt(Hz)].
     """
 
     gyro_noise_density: float
@@ -120,8 +112,7 @@ class RobotCalibration:
         T_imu_camera: Pose of the camera in the IMU's frame.
         T_body_imu: Pose of the IMU in the robot's body (x forward, z up).
         imu: Noise of the inertial sensor; None where the robot has none, or no gyro.
-        camera_time_offset_ns: What to add to a stamp of the camera to get the time on the
-            IMU's clock [ns].
+        camera_time_offset_ns: Time on the IMU's clock minus the camera's stamp [ns].
     """
 
     camera: PinholeCamera

@@ -135,10 +135,7 @@ class SE3:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _flaws(rotation: F64, translation: F64) -> tuple[float, bool]:
-    """By how much R R^T is off the identity, NaN where a number is not finite; whether det R < 0.
-
-    Compiled, for poses are made tens of thousands of times a minute.
-    """
+    """Deviation of R R^T from the identity, NaN for a non-finite number; whether det R < 0."""
     r = rotation
     off, finite = 0.0, True
     for i in range(3):

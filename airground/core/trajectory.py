@@ -49,11 +49,7 @@ class Trajectory:
         return SE3(self.rotations[index], self.translations[index])
 
     def at(self, stamp_ns: int) -> SE3:
-        """The pose at a time within the trajectory, linear in between.
-
-        Raises:
-            ValueError: The time lies before the first or after the last pose.
-        """
+        """The pose at a time, linear in between; ValueError outside the first and last stamp."""
         first, last = int(self.stamps_ns[0]), int(self.stamps_ns[-1])
         if not first <= stamp_ns <= last:
             raise ValueError(f"stamp {stamp_ns} is outside the trajectory [{first}, {last}]")

@@ -14,9 +14,7 @@ _HALF = 1 << (_BITS - 1)
 class VoxelMap:
     """A running mean of position and colour in every cube of side `voxel_m` that holds points.
 
-    Averaging before anything takes a maximum matters: the highest of many noisy points is
-    too high by a few of their standard deviations.
-    """
+    The highest of many noisy points is too high, hence the mean before any maximum."""
 
     def __init__(self, voxel_m: float) -> None:
         self.voxel_m = voxel_m
@@ -28,7 +26,7 @@ class VoxelMap:
         return len(self._keys)
 
     def add(self, points: Floats, colours: U8) -> None:
-        """Take in points (N, 3) [m] with colours (N, 3).
+        """Add points (N, 3) [m] with colours (N, 3).
 
         Raises:
             ValueError: A point lies outside the 2^21 cubes a side that a key can hold.

@@ -25,8 +25,7 @@ def read_ahead(
     """What `read` gives for each argument, in order; it raises where `read` does.
 
     At most `ahead` reads are done or under way ahead of use. They are independent of each other,
-    unless the pool has one thread.
-    """
+    unless the pool has one thread."""
     waiting: deque[Future[Item]] = deque()
     try:
         for argument in arguments:
@@ -43,8 +42,7 @@ def read_ahead(
 def run_ahead(items: Iterable[Item], ahead: int) -> Generator[Item]:
     """The same items, produced in a thread of their own; raises where `items` does.
 
-    At most `ahead` of them wait to be taken. Producer and consumer must share no mutable state.
-    """
+    At most `ahead` of them wait to be taken. Producer and consumer must share no mutable state."""
     iterator = iter(items)
     with ThreadPoolExecutor(1) as pool:
         made = read_ahead(pool, lambda _: list(islice(iterator, 1)), repeat(None), ahead)

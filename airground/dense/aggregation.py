@@ -1,12 +1,10 @@
 """From summed photometric errors to a mean cost per pixel and plane (Sec. V).
 
-The sum over a window is divided by the number of samples in it that some view really had,
-so that what lies outside a view neither costs nor saves anything.
+The sum over a window is divided by the number of its samples that lie within a view.
 
-Beside an edge, half of the views look at something else. With the views before and after
-the reference kept apart, one half may speak alone where it agrees better than all do by
-more than a penalty; without the penalty the lower of two noisy costs would win everywhere.
-"""
+Beside an edge, half of the views see something else. The views before the reference or those
+after it count alone where their mean is lower than that of all by more than a penalty; without
+the penalty the lower of two noisy costs would win everywhere."""
 
 from __future__ import annotations
 
@@ -34,7 +32,7 @@ def aggregate(
     Args:
         volumes: Cost volumes of one or both sides of a sweep.
         window_px: Side of the window, odd.
-        truncation: Cost of a sample at most, and of a place that no view covers [grey levels].
+        truncation: Largest cost of a sample, and cost where no view covers [grey levels].
         one_side_penalty: Extra cost of the mean over one side alone [grey levels].
         workspace: Memory of the result.
 
@@ -142,8 +140,7 @@ def box_mean(
 
     Args:
         first, last: (height, planes, width) uint16 summed costs; `last` counts if `both`.
-        first_limits, last_limits: (views, height, planes, 2) int16, columns [lo, hi) that a
-            view covers.
+        first_limits, last_limits: (views, height, planes, 2) int16 covered columns [lo, hi).
         both: Whether there are two volumes.
         radius: The window is 2 radius + 1 wide and high.
         uncovered: Stored mean where no view covers the window.

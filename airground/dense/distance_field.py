@@ -2,10 +2,8 @@
 
 A depth map gives a voxel the value f = (depth seen there - depth of the voxel) / truncation,
 cut to [-1, 1]: positive before the surface, negative behind it. A voxel farther behind the
-surface than the truncation is hidden: it gets no vote. The counts of a voxel, one a
-bin, are packed into one 32-bit word, four bits each: a histogram has at most 8 bins and
-takes at most 15 depth maps.
-"""
+surface than the truncation gets no vote. Four bits of a 32-bit word count each bin, so that a
+histogram has at most 8 bins and takes at most 15 depth maps."""
 
 from __future__ import annotations
 
@@ -26,7 +24,6 @@ class FieldHistogram:
     Attributes:
         truncation_m: Distance at which the field reaches -1 or 1 [m].
         counts: (rows, planes, columns) uint32, bin j in bits 4 j to 4 j + 3.
-        depth_maps: Number of depth maps in the histogram.
     """
 
     def __init__(

@@ -34,10 +34,9 @@ class Fusion:
         self._memory: F32 | None = None
 
     def fuse(self, counts: U32) -> F32:
-        """The field phi, (rows, planes, columns), for the packed histogram n(v, j) of that shape.
+        """The field phi (rows, planes, columns) for the packed histogram n(v, j) of that shape.
 
-        It is valid until the next call.
-        """
+        It is valid until the next call."""
         if self._memory is None or self._memory.shape[1:] != counts.shape:
             self._memory = np.empty((5, *counts.shape), np.float32)
         phi, ahead, dy, dk, dx = self._memory

@@ -97,9 +97,7 @@ class TurnedView:
 def _covered_columns(homography: F64, camera: PinholeCamera) -> I32:
     """(rows, 2) columns [lo, hi) where the 2 x 2 mean that starts there saw the image only.
 
-    Pixel (x, y) falls on (q_x / q_z, q_y / q_z) with q linear in both: that this is a place in
-    the image are inequalities that each give one end of the row.
-    """
+    Each border of the image is a linear inequality in x, which gives one end of the row."""
     to_x, to_y, to_z = homography
     inside = np.stack(
         [to_x, (camera.width - 1) * to_z - to_x, to_y, (camera.height - 1) * to_z - to_y, to_z]
@@ -121,9 +119,7 @@ def _covered_columns(homography: F64, camera: PinholeCamera) -> I32:
 class Workspace:
     """Arrays of uint16 that are free for use: memory that outlives a depth map.
 
-    A cost volume has 36 MB. Asking the system for it anew with each depth map, and touching it
-    for the first time, takes longer than aggregating it.
-    """
+    Allocating and first touching a cost volume of 36 MB takes longer than aggregating it."""
 
     def __init__(self) -> None:
         self._free: list[U16] = []
@@ -157,16 +153,14 @@ class CostVolume:
 class PlaneSweep:
     """Collects the evidence for the depth of one reference view.
 
-    Views before and after the reference have separate cost volumes where `sides` is 2:
-    what an edge hides from one side the other side sees.
-
     Args:
         image: (height, width) uint8, the reference at full resolution.
         camera: Camera of the reference at full resolution.
         T_mav_camera: Pose of the reference.
         depths: (planes,) depth hypotheses [m], evenly spaced in inverse depth.
         parameters: The section `plane_sweep` of the configuration.
-        sides: Number of cost volumes.
+        sides: Number of cost volumes; 2 keeps views before and after the reference apart, since
+            what an edge hides from one side the other side sees.
         workspace: Memory of the cost volumes.
     """
 
@@ -229,9 +223,8 @@ class PlaneSweep:
     def _plane_maps(self, centre: F64) -> tuple[F64, F64, F64, F64]:
         """Scale and shift from reference pixels to the view's half pixels, plane by plane.
 
-        A point at depth z on the ray of column x is at depth z - c_z before the turned
-        view, whose centre is c: u = cx + (f (x - cx) z / f - f c_x) / (z - c_z).
-        """
+        A point at depth z on the ray of column x is at depth z - c_z before the turned view with
+        centre c: u = cx + (f (x - cx) z / f - f c_x) / (z - c_z)."""
         camera = self.camera
         scale = self.depths / (self.depths - centre[2])
         x_shift = camera.cx * (1 - scale) - camera.fx * centre[0] / (self.depths - centre[2])
@@ -239,11 +232,10 @@ class PlaneSweep:
         return 2 * scale, 2 * x_shift, 2 * scale, 2 * y_shift
 
     def _gain(self, view: TurnedView, centre: F64) -> Gain:
-        """What gives the view the reference's brightness, seen through the middle plane.
+        """The view's gain, seen through the middle plane.
 
-        The least-squares plane through the ratio of the two, blurred so much that depth
-        does not matter, with one round of leaving out what fits badly.
-        """
+        It is the least-squares plane through the ratio of the blurred images, fitted twice: the
+        second time without the outliers of the first."""
         middle = len(self.depths) // 2
         column_scale, column_shift, row_scale, row_shift = (
             m[middle] / 2 for m in self._plane_maps(centre)

@@ -22,15 +22,15 @@ def cast_surface(
 ) -> tuple[F32, F32]:
     """Depth and normals of the surface in the volume's own view.
 
+    The votes are bin centres, so that the crossing of phi is known to a voxel only; the zero of the
+    line fitted to the voxels within half the truncation is far more exact.
+
     Args:
         volume: The voxels.
         phi: (rows, planes, columns) float32, the fused field, positive before the surface.
         counts: (rows, planes, columns) uint32, the packed histogram.
-        min_observations: Depth maps that must have voted for a surface close to the point
-            (within the truncation), or there is no point.
-        truncation_m: Distance at which phi reaches -1 or 1. Phi stands on the centres of
-            the bins, so that its crossing alone is known to a voxel only; the zero of the
-            line fitted to the voxels within half the truncation is known far better.
+        min_observations: Least number of votes for a surface within the truncation of a point.
+        truncation_m: Distance at which phi reaches -1 or 1 [m].
         bins: Number of bins of the histogram.
 
     Returns:
@@ -113,14 +113,9 @@ def _first_hits(
     k: int,
     hit: I32,
 ) -> None:
-    """Notes plane k where phi first falls below zero between it and the next, with support.
+    """Notes in `hit` the plane k where phi first falls below zero between k and k + 1.
 
-    Args:
-        here, behind: (columns,) phi on plane k and on plane k + 1.
-        word_here, word_behind: (columns,) uint32 packed histograms on both planes.
-        near: Mask of the bins that vote for a surface close by.
-        votes: Least number of votes for a hit.
-        hit: (columns,) int32 plane of the first hit, -1 before it; changed.
+    A crossing needs `votes` counts in the bins of the mask `near`. `hit` (columns,) is -1 before.
     """
     zero, plane = np.float32(0), np.int32(k)
     crossings = np.uint32(0)
@@ -136,15 +131,9 @@ def _first_hits(
 
 @njit(cache=True, error_model="numpy")
 def _line_zero(column: F32, k: int, reach: int, crossing: float) -> float:
-    """Where the line fitted to phi around a crossing is zero, in planes behind plane k.
+    """Zero of the line fitted to phi `reach` planes around plane k + 1/2, in planes behind k.
 
-    Args:
-        column: (planes,) phi along a ray.
-        k: The last plane before the crossing.
-        reach: Planes k + 1 - reach to k + reach are fitted.
-        crossing: The plain linear interpolation, which is kept where phi is no falling
-            line: within another surface's reach, or at the volume's end.
-    """
+    `crossing` where phi is no falling line: near another surface, or at the volume's end."""
     if k + 1 - reach < 0 or k + reach >= len(column):
         return crossing
     total, moment, square = 0.0, 0.0, 0.0

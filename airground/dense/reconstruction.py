@@ -35,11 +35,9 @@ MAX_OPEN = 4
 class DenseReconstruction:
     """Turns the MAV's posed images into surfaces.
 
-    Frames near a reference view are compared with it plane by plane until the camera has
-    left the radius; then the depth map is made. Depth maps near the first of a surface are
-    collected until one lies outside; then they are fused and cast into the view in their
-    middle. Each stage yields its event right after its work.
-    """
+    Frames near a reference view are compared with it until the camera has left the radius; then
+    the depth map is made. Depth maps near the first of a surface are collected until one lies
+    outside; then they are fused and cast into the view in their middle."""
 
     def __init__(self, camera: PinholeCamera, config: Config) -> None:
         self.camera = camera
@@ -66,13 +64,10 @@ class DenseReconstruction:
 
         Args:
             stamp_ns: Stamp of the image [ns].
-            image: (height, width) grey image.
+            image: (height, width) grey image; ValueError for another size than the camera's.
             T_mav_camera: Pose of the camera in the MAV's map.
             depth_range: Nearest and farthest point of SLAM's sparse map in the image [m]
                 (Sec. VIII-B); None where unknown.
-
-        Raises:
-            ValueError: The image does not have the camera's size.
         """
         if image.shape != (self.camera.height, self.camera.width):
             raise ValueError(

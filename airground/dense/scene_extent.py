@@ -51,8 +51,7 @@ def scene_extent(
         reference: View before which the scene lies.
         views: Other views of the scene; the one with the longest baseline is used.
         camera: Camera of all views.
-        mapped: Nearest and farthest point of the sparse map in the view [m], where there is
-            a map.
+        mapped: Depth range of the sparse map in the view [m]; None without a map.
     """
     ranges = [] if mapped is None else [mapped]
     if views:
@@ -91,9 +90,7 @@ def _depths(
 ) -> F64:
     """Depths of matched pixels (N, 2) that hold to the epipolar line and have parallax.
 
-    In the reference's axes, with rays r (here) and s (there) and the view's centre c:
-    z r = c + w s, so z (r x s) = c x s; both sides are compared along r x s.
-    """
+    With rays r (reference) and s (view) and the view's centre c: z (r x s) = c x s."""
     T_reference_view = reference.T_mav_camera.inverse() @ view.T_mav_camera
     inverse = np.linalg.inv(camera.matrix())
     rays = np.column_stack([here, np.ones(len(here))]) @ inverse.T

@@ -1,10 +1,8 @@
 """Semi-global smoothing of the cost volume (Hirschmueller, PAMI 2008), our addition.
 
-Along four directions each pixel's costs are joined with those of the pixel before it:
-staying on the plane is free, moving to the next costs little, a jump costs more, and less
-where the image has an edge. It sees farther than a window where texture is weak, and it
-lets depth jump at the outlines of boxes rather than within half a window of them.
-"""
+Along four directions each pixel's costs are joined with those of the pixel before it: staying on
+the plane is free, the next plane costs little, a jump costs more, and less across an image edge.
+It helps where texture is weak, and lets depth jump exactly at the outlines of boxes."""
 
 from __future__ import annotations
 
@@ -52,8 +50,7 @@ def smooth(mean: U16, reference: F32, parameters: Parameters, workspace: Workspa
 def jump_penalties(image: F32, step: int, jump: float, edge: float, across: U16, down: U16) -> None:
     """Fills (height, width) `across` and `down`: between a pixel and the one left of or above it.
 
-    The jump penalty is lower across an edge of the image, and never below `step`.
-    """
+    The jump penalty is lower across an edge of the image, and never below `step`."""
     height, width = image.shape
     for y in prange(height):
         for x in range(width):
@@ -66,17 +63,15 @@ def jump_penalties(image: F32, step: int, jump: float, edge: float, across: U16,
 def _extend(
     cost: U16, before: U16, after: U16, total: U16, lowest: np.uint16, step: int, jump: np.uint16
 ) -> np.uint16:
-    """One pixel of one path; `before` and `after` have one guard at either end.
+    """One pixel of one path; returns the lowest of `after`.
 
     Args:
         cost: (planes,) uint16 costs of the pixel.
-        before, after: (planes + 2,) uint16 path costs at the previous pixel, and here (filled).
+        before, after: (planes + 2,) uint16 path costs at the previous pixel, and here (filled),
+            with one guard at either end.
         total: (planes,) uint16 sum of path costs, added to.
         lowest: Lowest of `before`.
         step, jump: Penalties of a step and of a jump.
-
-    Returns:
-        The lowest of `after`.
     """
     small, cap = np.uint16(step), np.uint16(lowest + jump)
     lowest_here = np.uint16(65535)

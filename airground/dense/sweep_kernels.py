@@ -1,9 +1,7 @@
 """The inner loops of the plane sweep.
 
 The cost volume is laid out [row, plane, column]: one image row's costs at all planes fit the
-cache, and everything runs along columns. Rows are independent, so results do not depend on
-how many threads share them.
-"""
+cache. Rows are independent: results do not depend on the number of threads."""
 
 from __future__ import annotations
 

@@ -1,8 +1,6 @@
-"""Which frames make a depth map (Sec. VIII-B).
+"""Which frames make a depth map (Sec. VIII-B), decided from distances as frames come in.
 
-Everything is decided as frames come in, from distances alone. A hovering MAV makes neither views
-nor depth maps: a frame counts only once the camera has moved on.
-"""
+A frame counts only once the camera has moved on: a hovering MAV makes no depth maps."""
 
 from __future__ import annotations
 
@@ -37,10 +35,7 @@ class PosedImage:
 
 
 class ViewBuffer:
-    """The recent past: frames within the radius of the newest, evenly thinned.
-
-    It never holds more than `max_views` frames.
-    """
+    """The frames within the radius of the newest, evenly thinned to at most `max_views`."""
 
     def __init__(self, parameters: Parameters) -> None:
         self.radius = parameters.depth_map_radius_m
@@ -102,8 +97,7 @@ class ViewSet:
 def view_spacing(parameters: Parameters) -> float:
     """Least distance between the views of a depth map [m].
 
-    At 0.5 m/s and 30 Hz frames are 17 mm apart: with 16 views over 12 cm on each side every
-    frame is taken, with 8 every other one.
-    """
+    At 0.5 m/s and 30 Hz frames are 17 mm apart: with 16 views over 12 cm on each side every frame
+    is taken, with 8 every other one."""
     sides = 2 if parameters.both_sides else 1
     return sides * parameters.depth_map_radius_m / (parameters.max_views + 1)

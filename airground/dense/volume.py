@@ -1,10 +1,8 @@
 """The volume of interest of one surface, as voxels (Sec. V and VIII-B).
 
 The voxels are those of a camera frustum: pixels of a reference view by planes evenly spaced in
-depth. Unlike in a gravity-aligned grid, none lies outside the field of view, and the surface is
-cast along columns. Even steps in depth, not in inverse depth: the error of a crossing is a share
-of the step, and most of what the MAV sees is at the far end.
-"""
+depth. All lie in the field of view. Steps are even in depth, not in inverse depth: the error of a
+crossing is a share of the step, and most of what the MAV sees is at the far end."""
 
 from __future__ import annotations
 
@@ -23,14 +21,9 @@ ROBUST_PERCENT = 0.2
 
 @dataclass(frozen=True)
 class Volume:
-    """Voxels [row, plane, column] before a reference view.
+    """Voxels [row, plane, column] before a reference view at `T_mav_camera`.
 
-    Attributes:
-        camera: Camera whose pixels are the voxels' columns.
-        T_mav_camera: Pose of the reference view.
-        near_m, far_m: Depth of the first and the last plane [m].
-        planes: Number of planes.
-    """
+    The pixels of `camera` are the columns; the planes lie from `near_m` to `far_m`."""
 
     camera: PinholeCamera
     T_mav_camera: SE3

@@ -1,9 +1,8 @@
 """Keyframes of the ground robot, fused at their estimated poses (Sec. IV).
 
 A truncated signed distance field averages the sensor's noise along its rays. Averaging points in
-cubes does not: at 4 m the noise of structured light is wider than a cube, and the highest of
-scattered points would enter the height map. When SLAM corrects poses, keyframes are fused anew.
-"""
+cubes does not: at 4 m the noise of structured light is wider than a cube. When SLAM corrects
+poses, keyframes are fused anew."""
 
 from __future__ import annotations
 
@@ -32,11 +31,7 @@ _FIRST_BLOCKS = 10_000
 
 
 class FixedMap:
-    """A map of the ground from elsewhere: takes the place of a `GroundMap` and never changes.
-
-    Args:
-        cloud: Cloud in the frame `ground`, in which the ground robot's poses are given.
-    """
+    """A given map in the frame `ground` that takes the place of a `GroundMap` and never changes."""
 
     keyframes = 0
 
@@ -96,16 +91,10 @@ class GroundMap:
             self._fuse(keyframe, *keyframe.unpack())
 
     def follow(self, trajectory: Trajectory) -> bool:
-        """Move the keyframes to the poses of a corrected trajectory.
+        """Move the keyframes to their poses `T_ground_camera` in a corrected trajectory.
 
-        Args:
-            trajectory: `T_ground_camera` of the images tracked so far, by their stamps;
-                keyframes that it does not hold stay where they are.
-
-        Returns:
-            Whether one moved by more than the bounds of the configuration, so that the map
-            is fused anew when it is next asked for.
-        """
+        Keyframes that it does not hold stay. Returns whether one moved by more than the bounds of
+        the configuration, so that the map is fused anew when it is next asked for."""
         corrected = [_corrected(keyframe, trajectory) for keyframe in self._keyframes]
         distance, angle = self._config.follow_distance_m, self._config.follow_angle_deg
         if not any(

@@ -1,11 +1,8 @@
 """A depth image into the distance field of the ground map (Sec. IV).
 
-A voxel holds its mean signed distance to the surface, cut (Curless and Levoy, SIGGRAPH 1996).
-
-Open3D's own integration reads the pixel to the left of and above where a voxel falls, half a
-pixel off in the mean: a floor seen at a shallow angle then lies too low, and everything a
-millimetre or two to one side. Here a voxel reads the pixel that it falls on.
-"""
+A voxel holds its mean truncated signed distance (Curless and Levoy, SIGGRAPH 1996). It reads the
+pixel that it falls on. Open3D's integration rounds down, half a pixel off in the mean: a floor
+seen at a shallow angle then lies too low."""
 
 from __future__ import annotations
 
@@ -78,12 +75,10 @@ def add_view(
     """`integrate` on arrays.
 
     Args:
-        places: (N, 3) places of the blocks [blocks].
-        rows: (N,) rows of the blocks in the field.
-        depth, colour: Images as in `integrate`.
+        places, rows: (N, 3) places of the blocks [blocks] and their (N,) rows in the field.
+        depth, colour, voxel_m, truncation_m: As in `integrate`.
         pinhole: (4,) intrinsics fx, fy, cx, cy [px].
         T_camera_map: (3, 4) upper rows of the pose.
-        voxel_m, truncation_m: Lengths as in `integrate` [m].
         field: Distance, weight and colour of `BlockedField`; changed.
     """
     for block in prange(len(rows)):

@@ -75,16 +75,9 @@ class GroundKeyframe:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def usable_levels(depth: F32, max_depth_m: np.float32, step_m: np.float32) -> U16:
-    """Depth in steps, 0 where there is none to use.
+    """(height, width) depth [m] in steps of `step_m`, 0 where missing or beyond `max_depth_m`.
 
-    Beside a jump in depth the sensor mixes fore- and background: pixels on both sides are left
-    out, like those that are too far.
-
-    Args:
-        depth: (height, width) depth [m], NaN where missing.
-        max_depth_m: Largest depth to use [m].
-        step_m: Unit of the result [m].
-    """
+    Pixels on both sides of a jump in depth are left out: the sensor mixes fore- and background."""
     height, width = depth.shape
     levels = np.zeros(depth.shape, np.uint16)
     for y in range(height):
