@@ -1,9 +1,7 @@
 """The floor of each row: the least data to move and arithmetic to do, whatever the program.
-
-Counted are data that fit no cache (cost volumes, voxels), once in and once out of every pass
-that the method needs, and the arithmetic of the method's inner loop. Cached data, indices,
-conversions and comparisons are left out: the floor may be too low, never too high.
-"""
+Counted are data that fit no cache (cost volumes, voxels), once in and once out of every pass that
+the method needs, and the arithmetic of the method's inner loop. Cached data, indices, conversions
+and comparisons are left out: the floor may be too low, never too high."""
 
 from __future__ import annotations
 
@@ -59,19 +57,15 @@ class Floor:
 
 def add_frame(pixels: int, planes: int) -> Floor:
     """One view against all planes (Sec. V).
-
-    The view has two columns for each of the reference: two interpolations across rows and one
-    along the row make a sample; then difference and sum.
-    """
+    The view has two columns for each of the reference: two interpolations across rows and one along
+    the row make a sample; then difference and sum."""
     return Floor(2 * COST * pixels * planes, (3 * 3 + 2) * pixels * planes)
 
 
 def depth_map(pixels: int, planes: int, sides: int, semiglobal: bool) -> Floor:
     """Window means over the sides, smoothing along four directions, and the minimum.
-
     Running sums take four operations per side, whatever the window. Smoothing needs a pass along
-    rows and one along columns: each reads the means, and reads and writes the sums.
-    """
+    rows and one along columns: each reads the means, and reads and writes the sums."""
     samples = pixels * planes
     window = Floor(COST * (sides + 1) * samples, (4 * sides + 2) * samples)
     smoothing = Floor(2 * 3 * COST * samples, 4 * 6 * samples)
@@ -86,11 +80,9 @@ def distance_field(voxels: int) -> Floor:
 
 def fusion(voxels: int, iterations: int, bins: int) -> Floor:
     """Eq. 1 by primal-dual steps (Chambolle and Pock 2011).
-
     phi, its extrapolation and three dual fields are read and written, and the counts read, once:
-    rows can take any number of steps while they are in the cache. The prox takes a product,
-    two sums, a minimum and a maximum per bin.
-    """
+    rows can take any number of steps while they are in the cache. The prox takes a product, two
+    sums, a minimum and a maximum per bin."""
     operations = 17 + 8 + 5 * bins
     return Floor((10 * FLOAT + COUNTS) * voxels, operations * iterations * voxels)
 
@@ -107,11 +99,9 @@ def transforms(cells: int, count: int) -> Floor:
 
 def cost_map(cells: int) -> Floor:
     """Eq. 2 at all offsets by masked correlations.
-
-    Six transforms of values, squares and masks and three back: count, sum and sum of squares
-    of the differences; six complex products. `cells` are those of the searched square, widened
-    by the aerial map.
-    """
+    Six transforms of values, squares and masks and three back: count, sum and sum of squares of the
+    differences; six complex products. `cells` are those of the searched square, widened by the
+    aerial map."""
     return transforms(cells, 9) + Floor(0, 6 * 6 * cells / 2)
 
 
@@ -122,10 +112,8 @@ def heading_search(cells: int, headings: int) -> Floor:
 
 def particles(cells: int, count: int, turned: bool) -> Floor:
     """Six sums over the overlap at each particle, heights and mask interpolated.
-
     `cells` are the filled ones of the aerial map. If particles are `turned` by a heading, every
-    cell has its own place and weights.
-    """
+    cell has its own place and weights."""
     each = (7 + 7 + 1) + 10 + (8 + 6 if turned else 0)
     return Floor(0, each * cells * count)
 

@@ -1,8 +1,6 @@
 """A lane: one process with a fixed number of cores, which holds the material and takes turns.
-
-Some libraries read the number of threads once, when they are loaded, so one process cannot
-serve two numbers. A lane of one core is bound to one: no thread of any library can help.
-"""
+Some libraries read the number of threads once, when they are loaded, so one process cannot serve
+two numbers. A lane of one core is bound to one: no thread of any library can help."""
 
 from __future__ import annotations
 
@@ -44,9 +42,7 @@ T = TypeVar("T")
 @dataclass(frozen=True)
 class Opened:
     """What a lane measured while it made its material.
-
-    `played` is None unless the recording was played to its end.
-    """
+    `played` is None unless the recording was played to its end."""
 
     speed: Speed
     played: Played | None
@@ -84,9 +80,7 @@ class Lane:
 
     def peak_memory_mib(self, row: str) -> float | None:
         """What a row that has run before adds to the memory for its working memory and one call.
-
-        Its input was in memory before, and is not counted.
-        """
+        Its input was in memory before, and is not counted."""
         self.clear()
         with AddedMemory() as added:
             work = self._work(Contender(row))

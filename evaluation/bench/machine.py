@@ -1,9 +1,7 @@
 """What this machine can do at most, and what else it does while a benchmark runs.
-
 Memory: the triad of the STREAM benchmark (McCalpin 1995). Arithmetic: float32 multiply-adds on
 values in the first-level cache. The best of many short tries counts: other load slows them down,
-and seldom all of them.
-"""
+and seldom all of them."""
 
 from __future__ import annotations
 
@@ -82,9 +80,7 @@ class LoadAverage(NamedTuple):
 
 class LoadMeter:
     """Measures how many cores other programs keep busy from its construction on.
-
-    Processes that this one started count as its own once they have ended.
-    """
+    Processes that this one started count as its own once they have ended."""
 
     def __init__(self) -> None:
         self._wall_s, self._busy_s, self._own_s = time.monotonic(), _busy_s(), _own_s()

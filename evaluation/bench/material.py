@@ -1,8 +1,6 @@
 """The input of the rows: one aerial surface of a recording, and all that it came from.
-
-The whole pipeline runs over the recording, SLAM included, without truth. This is timed, and
-what the stages pass to each other is kept for one surface.
-"""
+The whole pipeline runs over the recording, SLAM included, without truth. This is timed, and what
+the stages pass to each other is kept for one surface."""
 
 from __future__ import annotations
 
@@ -100,10 +98,8 @@ class Material:
 @dataclass(frozen=True)
 class Played:
     """Times of the whole pipeline over the recording.
-
     `frame_ms` holds by robot ("mav", "ground") the processor time of each image, with the inertial
-    samples before it.
-    """
+    samples before it."""
 
     frame_ms: dict[str, list[float]]
     pipeline: RealTime

@@ -1,8 +1,6 @@
 """The same work by other libraries, on the same data.
-
-Each peer is used as its documentation shows, with every core that it takes by itself. The table
-at the end says where it does less or more than ours.
-"""
+Each peer is used as its documentation shows, with every core that it takes by itself. The table at
+the end says where it does less or more than ours."""
 
 from __future__ import annotations
 
@@ -121,10 +119,8 @@ def integrate_one(material: Material) -> Work:
 
 def integrate_and_extract(material: Material) -> Work:
     """Open3D: all depth maps of a surface, then its points.
-
-    Not `ray_cast`: on a new grid of Open3D 0.20 its first call allocates too little, and finds
-    no surface.
-    """
+    Not `ray_cast`: on a new grid of Open3D 0.20 its first call allocates too little, and finds no
+    surface."""
 
     def build() -> object:
         grid, reach = _surface_grid(material)

@@ -22,10 +22,8 @@ COLUMNS = 4
 @styled
 def bench_figure(report: BenchReport) -> Figure:
     """One bar per row: the median with all cores, a whisker to 95 %, one core as a tick.
-
     The number at the right end is the median [ms]. The part of a bar below the machine's floor is
-    dark. The paper's value is a diamond, hollow where the paper used a GPU; peers are triangles.
-    """
+    dark. The paper's value is a diamond, hollow where the paper used a GPU; peers are triangles."""
     rows = report.rows
     figure = Figure(figsize=(WIDE_IN, 0.30 * len(rows) + 1.45), layout="constrained")
     axes = figure.subplots()
@@ -124,9 +122,7 @@ def _conditions(report: BenchReport) -> str:
 @styled
 def curves_figure(report: BenchReport) -> Figure:
     """Growth of each stage's time with one size, and the exponents of the fitted power laws.
-
-    Medians by the clock in front, of the processor time of all threads behind.
-    """
+    Medians by the clock in front, of the processor time of all threads behind."""
     curves = report.curves
     height = math.ceil(len(curves) / COLUMNS)
     figure = Figure(figsize=(WIDE_IN, WIDE_IN / COLUMNS * height), layout="constrained")

@@ -1,7 +1,5 @@
 """The benchmark as a table: on the screen, in Markdown, and with its pictures in the docs.
-
-`python -m evaluation.bench.publish DIR` puts the results in DIR into this checkout's docs.
-"""
+`python -m evaluation.bench.publish DIR` puts the results in DIR into this checkout's docs."""
 
 from __future__ import annotations
 

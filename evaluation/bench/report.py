@@ -23,9 +23,7 @@ Positive = Annotated[int, Field(ge=1)]
 
 class Timing(Part):
     """Times of the calls by the clock, and the median of their processor time.
-
-    `cpu_median_ms` counts all threads; null where it was not measured.
-    """
+    `cpu_median_ms` counts all threads; null where it was not measured."""
 
     n: Positive
     mean_ms: Amount
@@ -65,9 +63,7 @@ class LaneTiming(Part):
 
 class PeerTiming(Part):
     """Another library on the same data, in turns with the row, on all cores.
-
-    `times_ours` is its time over ours, the median over the rounds; above 1 it is slower.
-    """
+    `times_ours` is its time over ours, the median over the rounds; above 1 it is slower."""
 
     name: str
     differs: str
@@ -77,10 +73,8 @@ class PeerTiming(Part):
 
 class RowResult(Part):
     """One line of the table; `lanes` holds one core first, then all.
-
     `peak_memory_mib` is what the stage adds to its input in memory, null where not counted;
-    `missing_peers` are not installed.
-    """
+    `missing_peers` are not installed."""
 
     name: str
     title: str
@@ -103,10 +97,8 @@ class RowResult(Part):
 
 class RealTime(Part):
     """The whole pipeline with SLAM over the recording, as fast as it goes.
-
     `peak_memory_mib` is what this added to the processes, `resident_mib` all that the processes
-    held after each tenth of the recording.
-    """
+    held after each tenth of the recording."""
 
     threads: Positive
     recorded_s: Amount
@@ -119,9 +111,7 @@ class RealTime(Part):
 
 class Machine(Part):
     """Where the benchmark ran, and under which load.
-
-    `other_cores` is the mean number of cores that other programs kept busy, null if unknown.
-    """
+    `other_cores` is the mean number of cores that other programs kept busy, null if unknown."""
 
     cpu: str
     cores: Positive
@@ -149,10 +139,8 @@ class CurvePointTiming(Part):
 
 class CurveResult(Part):
     """How a stage grows: time = a value^exponent on the whole, with all cores.
-
     `exponent` is of the clock's medians, `cpu_exponent` of the processor time's, which other
-    programs change little.
-    """
+    programs change little."""
 
     name: str
     title: str

@@ -46,9 +46,7 @@ def run_benchmark(
     say: Callable[[str], None],
 ) -> BenchReport:
     """Time rows on one core and on all, over a recording of both robots.
-
-    `seconds_a_row` is the time for a row with its peers; `say` takes a line about each step.
-    """
+    `seconds_a_row` is the time for a row with its peers; `say` takes a line about each step."""
     info = RunInfo.here(seed=0)
     recording = Recording.open(path)
     counts = sorted({1, threads})

@@ -56,10 +56,8 @@ def interleaved(
     contenders: Mapping[Key, Callable[[float], Turn]], seconds: float
 ) -> dict[Key, list[Turn]]:
     """Let contenders take turns until the time is up, and at least `LEAST_ROUNDS` times.
-
     `seconds` is the time for all of them together, without the first turns, which compile. Each
-    contender has one turn per round.
-    """
+    contender has one turn per round."""
     for take in contenders.values():
         take(0.0)
     share = seconds / (ROUNDS * len(contenders))

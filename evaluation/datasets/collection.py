@@ -1,8 +1,6 @@
 """Many recordings as one dataset, split by world, made in parallel and resumed where it stopped.
-
 Until all are made the folder is called `.NAME.partial`. Recordings appear in it when they are
-complete: after an interruption the next call makes only what is missing.
-"""
+complete: after an interruption the next call makes only what is missing."""
 
 from __future__ import annotations
 

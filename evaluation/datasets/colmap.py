@@ -1,7 +1,5 @@
 """A COLMAP model in text form, of true poses and true points (colmap.github.io/format).
-
-The centre of the upper left pixel is at (0.5, 0.5). Poses map the world to the camera.
-"""
+The centre of the upper left pixel is at (0.5, 0.5). Poses map the world to the camera."""
 
 from __future__ import annotations
 

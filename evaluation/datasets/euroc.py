@@ -1,7 +1,5 @@
 """The MAV as an EuRoC/ASL folder (Burri et al., IJRR 2016); docs/datasets.md lists it.
-
-The body of T_BS is the IMU. EuRoC itself has no magnetometer (`mag0/`).
-"""
+The body of T_BS is the IMU. EuRoC itself has no magnetometer (`mag0/`)."""
 
 from __future__ import annotations
 
@@ -84,11 +82,9 @@ def _write_states(path: Path, simulated: Simulated) -> None:
 
 def _biases(simulated: Simulated) -> NDArray[np.float64]:
     """(N, 6) biases of gyro [rad/s] and accelerometer [m/s^2].
-
     A recording does not hold the biases that its simulator drew. These are estimates, as EuRoC's
-    are, but from the truth: white noise remains with its density over
-    sqrt(2 sqrt(pi) BIAS_WINDOW_S).
-    """
+    are, but from the truth: white noise remains with its density over sqrt(2 sqrt(pi)
+    BIAS_WINDOW_S)."""
     samples, _ = simulated.samples("mav")
     motion = simulated.motion("mav")
     measured = np.hstack([samples.gyro, samples.accelerometer])

@@ -1,7 +1,5 @@
 """The formats by name: a literal table.
-
-To add one, write a function that fills an empty folder, and put a line here.
-"""
+To add one, write a function that fills an empty folder, and put a line here."""
 
 from __future__ import annotations
 

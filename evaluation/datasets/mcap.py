@@ -1,7 +1,5 @@
 """A recording as a ROS 2 bag in MCAP, for `ros2 bag play`, Foxglove and rerun.
-
-docs/datasets.md lists the topics.
-"""
+docs/datasets.md lists the topics."""
 
 from __future__ import annotations
 

@@ -1,7 +1,5 @@
 """One robot's images for Nerfstudio and other readers of its `transforms.json`.
-
-Poses are in OpenGL's axes: the camera looks along -z with y up. Pixel centres are at halves.
-"""
+Poses are in OpenGL's axes: the camera looks along -z with y up. Pixel centres are at halves."""
 
 from __future__ import annotations
 

@@ -1,8 +1,6 @@
 """ROS 2 messages of standard types, from what a recording holds.
-
-Axes follow REP 103 and 105: x forward and z up in `base_link`; `camera_optical` has x right,
-y down, z forward, as OpenCV's cameras and ours.
-"""
+Axes follow REP 103 and 105: x forward and z up in `base_link`; `camera_optical` has x right, y
+down, z forward, as OpenCV's cameras and ours."""
 
 from __future__ import annotations
 

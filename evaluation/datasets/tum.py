@@ -1,7 +1,5 @@
 """The ground robot as a TUM RGB-D folder (Sturm et al., IROS 2012); docs/datasets.md lists it.
-
-TUM's own folders have no calibration, gyro and magnetometer.
-"""
+TUM's own folders have no calibration, gyro and magnetometer."""
 
 from __future__ import annotations
 

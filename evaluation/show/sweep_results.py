@@ -35,9 +35,7 @@ COLUMNS = 3
 
 def write_sweep(folder: Path, plan: SweepPlan, measured: Sequence[Measured]) -> None:
     """Write table, readings, configuration and figure into an existing folder.
-
-    The same sweep gives the same bytes, whatever the order of its units.
-    """
+    The same sweep gives the same bytes, whatever the order of its units."""
     # Each row has a column for each dial.
     rows = [
         at.table.frame.assign(**{name: _column(value) for name, value in at.point.items()})

@@ -1,10 +1,9 @@
 """Fit of true poses to images: images are warped into later ones, and compared.
 
-An image is warped into another one by its depth and the true poses. If pose, depth, calibration
-and stamps are right, their difference is lowest there, and higher with poses turned so that
-everything lies two pixels beside. The minimum of the parabola through these three errors is
-the error of the truth in pixels.
-"""
+An image is warped into another one by its depth and the true poses. If pose, depth, calibration and
+stamps are right, their difference is lowest there, and higher with poses turned so that everything
+lies two pixels beside. The minimum of the parabola through these three errors is the error of the
+truth in pixels."""
 
 from __future__ import annotations
 

@@ -20,9 +20,7 @@ PAGE = "compare.html"
 
 def write_comparison(out: Path, helds: Sequence[Against]) -> None:
     """Write the page and `figures/` (PNG and PDF) into an existing folder.
-
-    All of `helds`, one at least, have the same reference.
-    """
+    All of `helds`, one at least, have the same reference."""
     reference = helds[0].reference
     runs = [reference, *(held.run for held in helds)]
     page = rendered(

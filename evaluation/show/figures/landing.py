@@ -1,8 +1,6 @@
 """An animation: the images of both robots, and the aerial surface moving to its place in the map.
-
-Only the ends of the motion are results: where the particles place the surface, and where
-refinement does.
-"""
+Only the ends of the motion are results: where the particles place the surface, and where refinement
+does."""
 
 from __future__ import annotations
 

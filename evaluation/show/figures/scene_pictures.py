@@ -1,8 +1,6 @@
 """Pictures of the augmented map (Fig. 5 and 15), rendered offscreen by pyrender.
-
-pyrender's shadows fail with numpy 2, and clouds have no surfaces to light. Every pixel that has
-a nearer neighbour is darkened instead, which makes shape visible (eye-dome lighting).
-"""
+pyrender's shadows fail with numpy 2, and clouds have no surfaces to light. Every pixel that has a
+nearer neighbour is darkened instead, which makes shape visible (eye-dome lighting)."""
 
 from __future__ import annotations
 
@@ -92,10 +90,8 @@ def render_augmented_map(
     showcase: Showcase, view: Viewpoint, size_px: tuple[int, int] = SIZE_PX
 ) -> NDArray[np.uint8]:
     """(height, width, 3) picture of both clouds, both paths and the cameras.
-
-    Ground points are red, aerial points grey; the ground robot's path and cameras are
-    blue, the MAV's green.
-    """
+    Ground points are red, aerial points grey; the ground robot's path and cameras are blue, the
+    MAV's green."""
     os.environ.setdefault("PYOPENGL_PLATFORM", "egl")
     import pyrender
 

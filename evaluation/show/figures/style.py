@@ -74,10 +74,8 @@ styled = mpl.rc_context(STYLE)  # type: ignore[arg-type]
 @dataclass(frozen=True)
 class ReportFigure:
     """A figure with its heading and caption; `name` is that of its files, without ending.
-
-    The caption names content, conditions, and the published value to compare with. A figure that
-    is `wide` needs the full width of a page.
-    """
+    The caption names content, conditions, and the published value to compare with. A figure that is
+    `wide` needs the full width of a page."""
 
     name: str
     title: str

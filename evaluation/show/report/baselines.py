@@ -28,9 +28,7 @@ HEADER = (
 
 def baseline_table(table: ResultTable) -> TextTable:
     """One row a baseline; no rows where none was tried (of one condition).
-
-    Where control scenes were flown over too, a last column counts the claims there.
-    """
+    Where control scenes were flown over too, a last column counts the claims there."""
     measured, controls = table.without_controls(), table.controls()
     rows = [(baseline, _cells(measured, baseline)) for baseline in BASELINES]
     tried = [(baseline, cells) for baseline, cells in rows if cells]
@@ -74,9 +72,7 @@ def _claims(table: ResultTable, baseline: Baseline) -> str:
 
 def baseline_trials(table: ResultTable, name: str) -> pd.DataFrame:
     """One row a trial with columns claimed, horizontal_m, translation_m, rotation_deg and ms.
-
-    What has no guess has NaN errors, which lie within no limit.
-    """
+    What has no guess has NaN errors, which lie within no limit."""
     columns = ("claimed", "horizontal_m", "translation_m", "rotation_deg", "ms")
     metrics = {f"{name}_{column}": column for column in columns}
     frame = table.frame[(table.frame["stage"] == STAGE) & table.frame["metric"].isin(metrics)]

@@ -97,9 +97,7 @@ def pinhole(
     camera: PinholeCamera, scale: float, frames: tuple[str, str], colour: tuple[int, int, int]
 ) -> rr.Pinhole:
     """A camera for images of another size; rerun counts pixels from the image's corner.
-
-    `scale` is a share of the full size; `frames` are those of the camera and of its image.
-    """
+    `scale` is a share of the full size; `frames` are those of the camera and of its image."""
     return rr.Pinhole(
         focal_length=(scale * camera.fx, scale * camera.fy),
         principal_point=(scale * (camera.cx + 0.5), scale * (camera.cy + 0.5)),

@@ -59,9 +59,7 @@ class Localization:
 
     def _draw_heights(self, stamp_ns: int, cost_map: CostMap) -> None:
         """The aerial map around its camera, the ground map where there are costs.
-
-        The viewer treats the pictures of an entity as a video: all have one size.
-        """
+        The viewer treats the pictures of an entity as a video: all have one size."""
         assert self._heights is not None
         aerial, ground = self._heights.aerial, self._heights.ground
         if self._aerial_cells is None:

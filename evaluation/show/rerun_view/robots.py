@@ -71,9 +71,8 @@ class GrowingPath:
 
 class MovingCamera:
     """A camera and its path, drawn at the rates of a level.
-
-    `frames` are the one that it moves in and its own; `entities` are the camera's and the path's.
-    """
+    `frames` are the one that it moves in and its own; `entities` are the camera's and the
+    path's."""
 
     def __init__(
         self,

@@ -33,9 +33,7 @@ EYE_M, TARGET_M = (-2.9, -3.4, 4.3), (1.3, 0.7, 0.2)
 
 class RunView:
     """An onlooker that writes a run to an .rrd file, and to a viewer that listens at an address.
-
-    Without truth, errors and everything else under `/truth` are left out.
-    """
+    Without truth, errors and everything else under `/truth` are left out."""
 
     def __init__(
         self,
@@ -73,9 +71,7 @@ class RunView:
 
 def layout(with_truth: bool) -> rrb.Blueprint:
     """The world on the left, the results of each stage on the right, curves below.
-
-    Without truth there is no panel for it.
-    """
+    Without truth there is no panel for it."""
     return rrb.Blueprint(
         rrb.Vertical(
             rrb.Horizontal(

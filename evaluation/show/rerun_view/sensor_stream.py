@@ -37,9 +37,7 @@ _AT_ONCE = rr.ChunkBatcherConfig(flush_tick=0.05)
 
 class SensorStream:
     """Writes to an .rrd file, and to a viewer if one listens at an address ("rerun+http://...").
-
-    The file contains the layout, so that every viewer opens it in the same way.
-    """
+    The file contains the layout, so that every viewer opens it in the same way."""
 
     def __init__(
         self, path: Path, name: str, layout: rrb.Blueprint, viewer: str | None = None

@@ -49,10 +49,8 @@ class LivePoses:
 
 class Curves:
     """Curves of a run; with truth also errors.
-
-    Errors are those of the belief ("particles"), of the alignment ("refined"), and of the
-    newest poses under the newest accepted alignment ("live").
-    """
+    Errors are those of the belief ("particles"), of the alignment ("refined"), and of the newest
+    poses under the newest accepted alignment ("live")."""
 
     def __init__(self, stream: SensorStream, level: Level, truth: Truth | None) -> None:
         self._stream, self._truth = stream, truth

@@ -1,8 +1,6 @@
 """Rerun's own program: its viewer in a window or in a browser, on loopback only.
-
-The SDK's servers (`serve_grpc`, `serve_web_viewer`, `spawn`) listen on every interface without
-an option to change that. Rerun's program has one (`--bind`), so that program serves.
-"""
+The SDK's servers (`serve_grpc`, `serve_web_viewer`, `spawn`) listen on every interface without an
+option to change that. Rerun's program has one (`--bind`), so that program serves."""
 
 from __future__ import annotations
 
