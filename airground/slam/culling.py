@@ -1,9 +1,8 @@
 """Removing redundant keyframes.
 
 The rule of ORB-SLAM (Mur-Artal, Montiel and Tardos, T-RO 2015, Sec. VI-E), with one difference:
-there, others must have seen a keyframe's points; here it is enough that they look where the
-points are, from about the same side. A place that is visited again and again gets new points
-each time, and only so the number of keyframes stays bounded in a bounded area.
+others need not have seen a keyframe's points, only look at them from about the same side. Each
+visit adds points; only so the number of keyframes stays bounded in a bounded area.
 """
 
 from __future__ import annotations

@@ -45,12 +45,8 @@ class FeatureTracker:
         self.image = image
 
     def advance(self, image: U8, start: Floats, extra_levels: int = 0) -> None:
-        """Follow every corner into the next image; those not found are given up.
-
-        Args:
-            start: (N, 2) expected pixels of the corners.
-            extra_levels: More pyramid levels, where the expectation is poor.
-        """
+        """Follow every corner into the next image from its expected pixel, (N, 2) `start`.
+        Corners that are not found go; `extra_levels` of the pyramid help a poor expectation."""
         if self.image is not None and len(self.ids):
             levels = self._levels + extra_levels
             pixels, found = flow(

@@ -58,11 +58,7 @@ class LoopCloser:
 
     def close(self, depth: F32 | None, inertial: bool) -> bool:
         """Correct the whole map if the newest keyframe shows an old place; returns whether it did.
-
-        Args:
-            depth: (height, width) depth of the newest keyframe [m]; None without a depth camera.
-            inertial: Whether the map is metric and gravity-aligned by the accelerometer.
-        """
+        `depth` is the keyframe's (height, width) depth [m]; None without a depth camera."""
         first_recent = len(self.map.keyframes) - 1 - self.parameters.window
         # Without depth or accelerometer the scale drifts, too, which this cannot mend.
         if first_recent <= 0 or (depth is None and not inertial):
@@ -139,7 +135,6 @@ class MapSnapshot:
 
     @classmethod
     def of(cls, sparse_map: SparseMap) -> MapSnapshot:
-        """The map as it is now."""
         keyframes = sparse_map.keyframes
         return cls(
             [keyframe.state for keyframe in keyframes],

@@ -108,9 +108,7 @@ class MotionModel:
         self, before: RigState, prediction: Prediction, T_map_rig: SE3, seconds: float | None
     ) -> RigState:
         """The state at an image that gave a pose, `seconds` after the previous image [s].
-
-        None for `seconds`: the previous image had no pose, and the velocity is unknown.
-        """
+        `seconds` is None if that one had no pose, so that the velocity is unknown."""
         state = prediction.state.posed(T_map_rig)
         if prediction.inertial:
             return state

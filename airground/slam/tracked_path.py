@@ -25,7 +25,6 @@ class TrackedPath:
         return self._count
 
     def clear(self) -> None:
-        """Give up all images."""
         self._count = 0
         self._stamps = np.empty((FIRST_IMAGES, 2), np.int64)
         self._poses = np.empty((FIRST_IMAGES, 3, 4))

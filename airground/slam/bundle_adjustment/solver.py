@@ -180,7 +180,6 @@ def _reduce(equations: NormalEquations, damping: float) -> tuple[F64, F64, F64, 
 
 
 def _back(lower: F64, right: F64) -> F64:
-    """Solve with the factor."""
     return dpotrs(lower, right, lower=1)[0] if len(right) else right
 
 

@@ -70,7 +70,6 @@ class KeyframeIndex:
         self._descriptors[keyframe_id] = describe(image, pixels).descriptors
 
     def remove(self, keyframe_id: int) -> None:
-        """Forget a keyframe."""
         del self._point_ids[keyframe_id], self._descriptors[keyframe_id]
 
     def alike(self, query: Described, among: list[int] | None = None) -> list[int]:

@@ -1,8 +1,7 @@
 """One inertial motion out of two that follow each other, without their samples.
 
-The composition of preintegrated motions, with covariance and Jacobians carried on by the chain
-rule as in Forster, Carlone, Dellaert and Scaramuzza, "On-manifold preintegration for real-time
-visual-inertial odometry", T-RO 2017, Appendix A and B.
+Covariance and Jacobians are carried on by the chain rule as in the paper that `preintegration`
+cites, Appendix A and B.
 """
 
 from __future__ import annotations

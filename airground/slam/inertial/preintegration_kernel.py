@@ -1,8 +1,6 @@
 """The compiled sum of inertial samples into one relative motion.
 
-Forster, Carlone, Dellaert and Scaramuzza, "On-manifold preintegration for real-time
-visual-inertial odometry", T-RO 2017, with the mean of both ends of each step in place of its
-start (the midpoint rule).
+The method of `preintegration`, by the mean of both ends of each step (the midpoint rule).
 """
 
 from __future__ import annotations
