@@ -3,7 +3,6 @@
 
 class AirgroundError(Exception):
     """A problem that one line explains: what was wrong, where, and what would be right.
-
     The command line prints it without a traceback and exits non-zero. Anything else is a bug."""
 
 

@@ -1,9 +1,7 @@
 """The localization and mapping pipeline, as in the paper's Figure 4.
 
-Tracked frames in, events out. Each robot maps on its own; whenever the MAV has a new
-surface it is located in the ground robot's map, refined, and added to it. Tracking
-(`tracking.py`) does not depend on mapping.
-"""
+Tracked frames in, events out. Each robot maps on its own; each new surface of the MAV is located
+in the ground robot's map, refined, and added to it. Tracking does not depend on mapping."""
 
 from __future__ import annotations
 
@@ -121,8 +119,7 @@ class Pipeline:
         config: The pipeline's parameters.
         mav, ground: Nominal calibration of each robot.
         rng: Source of all random numbers.
-        T_ground_mav_prior: Prior pose; if given, refinement starts from it and the global search is
-            skipped (Sec. III).
+        T_ground_mav_prior: Prior pose that replaces the global search (Sec. III).
     """
 
     def __init__(

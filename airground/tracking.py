@@ -1,8 +1,7 @@
 """The lower half of Figure 4: each robot tracks on its own and sends frames to the mapper.
 
 A tracker never depends on the mapper, and its frames never change afterwards: mapping gives the
-same result in this process or in another one, at any speed.
-"""
+same result in this process or in another one, at any speed."""
 
 from __future__ import annotations
 
@@ -38,11 +37,10 @@ class TrackedFrame:
     """One image, and what the mapper receives with it.
 
     Attributes:
-        image: Image of the robot's camera.
-        pose: Answer of the front end to it.
+        image, pose: Image of the robot's camera, and the front end's answer to it.
         north_rad: Direction of magnetic north in the robot's map [rad]; None while unknown.
-        trajectory: Newest poses of all images so far, of the ground robot and only where this
-            image corrected its map; else None.
+        trajectory: Poses of all images so far, where this image of the ground robot corrected its
+            map; else None.
     """
 
     image: MavImage | GroundImage
@@ -126,9 +124,7 @@ class Trackers:
 
 class HandOver:
     """Frames of one robot on their way to the mapper, some of which are dropped.
-
-    The correction of the map in a dropped frame goes into the next frame that arrives.
-    """
+    The correction of the map in a dropped frame goes into the next frame that arrives."""
 
     def __init__(self) -> None:
         self._correction: Trajectory | None = None

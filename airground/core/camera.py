@@ -65,7 +65,6 @@ class PinholeCamera:
 
     def halved(self) -> PinholeCamera:
         """The camera of the image averaged over 2 x 2 pixels.
-
         A pixel centre at i covers 2i and 2i + 1, hence the quarter pixel."""
         return PinholeCamera(
             self.width // 2,

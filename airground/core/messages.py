@@ -15,7 +15,6 @@ from airground.core.se3 import SE3
 @dataclass(frozen=True, eq=False)
 class MavImage:
     """One image of the MAV's downward camera: (height, width) uint8, grey.
-
     `stamp_ns` is the middle of the exposure on the camera's clock [ns]."""
 
     stamp_ns: int

@@ -1,8 +1,7 @@
 """Rigid motions.
 
 `T_a_b` maps coordinates in frame b to frame a; adjacent letters cancel:
-`T_ground_camera = T_ground_mav @ T_mav_camera`.
-"""
+`T_ground_camera = T_ground_mav @ T_mav_camera`."""
 
 from __future__ import annotations
 

@@ -13,7 +13,6 @@ _HALF = 1 << (_BITS - 1)
 
 class VoxelMap:
     """A running mean of position and colour in every cube of side `voxel_m` that holds points.
-
     The highest of many noisy points is too high, hence the mean before any maximum."""
 
     def __init__(self, voxel_m: float) -> None:

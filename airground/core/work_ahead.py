@@ -41,7 +41,6 @@ def read_ahead(
 
 def run_ahead(items: Iterable[Item], ahead: int) -> Generator[Item]:
     """The same items, produced in a thread of their own; raises where `items` does.
-
     At most `ahead` of them wait to be taken. Producer and consumer must share no mutable state."""
     iterator = iter(items)
     with ThreadPoolExecutor(1) as pool:

@@ -3,8 +3,7 @@
     min over phi of  sum over v of  |grad phi| + lambda sum_j n(v, j) |phi(v) - c_j|
 
 by the first-order primal-dual method of Chambolle and Pock (2011), on the voxel grid with
-forward differences and a step of one voxel in each direction.
-"""
+forward differences and a step of one voxel in each direction."""
 
 from __future__ import annotations
 
@@ -35,7 +34,6 @@ class Fusion:
 
     def fuse(self, counts: U32) -> F32:
         """The field phi (rows, planes, columns) for the packed histogram n(v, j) of that shape.
-
         It is valid until the next call."""
         if self._memory is None or self._memory.shape[1:] != counts.shape:
             self._memory = np.empty((5, *counts.shape), np.float32)
@@ -92,8 +90,7 @@ def iterate(
     lacks one more row at either end. These seams are made up for when all blocks are done.
 
     With `from_start`, the dual counts as zero and the extrapolation as phi:
-    filling them first would cost two passes through memory.
-    """
+    filling them first would cost two passes through memory."""
     rows = len(phi)
     blocks = max(rows // BLOCK_ROWS, 1)
     fields = counts, phi, ahead, dy, dk, dx
@@ -187,8 +184,7 @@ def primal_step(
     The prox of tau lambda sum_j n_j |phi - c_j| at v is
     max over k = 0..8 of min(v + tau lambda W_k, c_{k+1}) with W_0 = N, W_k = W_{k-1} - 2 n_k
     and c_9 = inf: the k-th term is the solution if it lies between c_k and c_{k+1}. With
-    fewer than eight bins the rest stay empty and add no kink.
-    """
+    fewer than eight bins the rest stay empty and add no kink."""
     for x in range(len(phi)):
         value = prox(moved[x], np.uint32(word[x]), data_weight, width)
         ahead[x] = value + value - phi[x]
@@ -204,9 +200,7 @@ def _count(word: np.uint32, bits: int) -> np.float32:
 @njit(cache=True, inline="always", error_model="numpy", fastmath=FAST)
 def prox(v: np.float32, word: np.uint32, weight: np.float32, spacing: np.float32) -> np.float32:
     """argmin over u of (u - v)^2 / 2 + weight sum_j n_j |u - c_j|, for packed counts.
-
-    The centres are c_j = spacing (j + 1/2) - 1, j = 0..7.
-    """
+    The centres are c_j = spacing (j + 1/2) - 1, j = 0..7."""
     n0, n1, n2, n3 = _count(word, 0), _count(word, 4), _count(word, 8), _count(word, 12)
     n4, n5, n6, n7 = _count(word, 16), _count(word, 20), _count(word, 24), _count(word, 28)
     w = weight * (n0 + n1 + n2 + n3 + n4 + n5 + n6 + n7)

@@ -2,8 +2,7 @@
 
 A view is first turned so that it looks the way the reference does. Then a plane parallel to the
 image is only scaled and shifted: every row is read in order. The view keeps the full resolution,
-each pixel averaged over 2 x 2: a sample at any position has the blur of the halved reference.
-"""
+each pixel averaged over 2 x 2: a sample at any position has the blur of the halved reference."""
 
 from __future__ import annotations
 
@@ -49,8 +48,7 @@ class Gain:
     """Brightness of the reference over that of a view: level + x column + y row.
 
     The level follows the exposure. Vignetting falls with the square of the distance from
-    the middle, so that the ratio of two views shifted against each other is a plane.
-    """
+    the middle, so that the ratio of two views shifted against each other is a plane."""
 
     level: float
     x: float
@@ -96,7 +94,6 @@ class TurnedView:
 
 def _covered_columns(homography: F64, camera: PinholeCamera) -> I32:
     """(rows, 2) columns [lo, hi) where the 2 x 2 mean that starts there saw the image only.
-
     Each border of the image is a linear inequality in x, which gives one end of the row."""
     to_x, to_y, to_z = homography
     inside = np.stack(
@@ -118,7 +115,6 @@ def _covered_columns(homography: F64, camera: PinholeCamera) -> I32:
 
 class Workspace:
     """Arrays of uint16 that are free for use: memory that outlives a depth map.
-
     Allocating and first touching a cost volume of 36 MB takes longer than aggregating it."""
 
     def __init__(self) -> None:

@@ -132,7 +132,6 @@ def _first_hits(
 @njit(cache=True, error_model="numpy")
 def _line_zero(column: F32, k: int, reach: int, crossing: float) -> float:
     """Zero of the line fitted to phi `reach` planes around plane k + 1/2, in planes behind k.
-
     `crossing` where phi is no falling line: near another surface, or at the volume's end."""
     if k + 1 - reach < 0 or k + reach >= len(column):
         return crossing

@@ -2,8 +2,7 @@
 
 The paper reads it off the sparse map of the monocular SLAM, which lacks what just came into view.
 So corners of the reference are tracked into its farthest view and triangulated as well, and both
-ranges are joined.
-"""
+ranges are joined."""
 
 from __future__ import annotations
 
@@ -89,7 +88,6 @@ def _depths(
     reference: PosedImage, view: PosedImage, camera: PinholeCamera, here: F32, there: F32
 ) -> F64:
     """Depths of matched pixels (N, 2) that hold to the epipolar line and have parallax.
-
     With rays r (reference) and s (view) and the view's centre c: z (r x s) = c x s."""
     T_reference_view = reference.T_mav_camera.inverse() @ view.T_mav_camera
     inverse = np.linalg.inv(camera.matrix())

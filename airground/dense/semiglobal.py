@@ -49,7 +49,6 @@ def smooth(mean: U16, reference: F32, parameters: Parameters, workspace: Workspa
 @njit(cache=True, parallel=True, nogil=True, error_model="numpy")
 def jump_penalties(image: F32, step: int, jump: float, edge: float, across: U16, down: U16) -> None:
     """Fills (height, width) `across` and `down`: between a pixel and the one left of or above it.
-
     The jump penalty is lower across an edge of the image, and never below `step`."""
     height, width = image.shape
     for y in prange(height):

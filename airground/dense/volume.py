@@ -22,7 +22,6 @@ ROBUST_PERCENT = 0.2
 @dataclass(frozen=True)
 class Volume:
     """Voxels [row, plane, column] before a reference view at `T_mav_camera`.
-
     The pixels of `camera` are the columns; the planes lie from `near_m` to `far_m`."""
 
     camera: PinholeCamera

@@ -76,7 +76,6 @@ class GroundKeyframe:
 @njit(cache=True, nogil=True, error_model="numpy")
 def usable_levels(depth: F32, max_depth_m: np.float32, step_m: np.float32) -> U16:
     """(height, width) depth [m] in steps of `step_m`, 0 where missing or beyond `max_depth_m`.
-
     Pixels on both sides of a jump in depth are left out: the sensor mixes fore- and background."""
     height, width = depth.shape
     levels = np.zeros(depth.shape, np.uint16)

@@ -1,9 +1,7 @@
 """From the fused field to points: where it changes its sign between neighbouring voxels.
 
-Open3D's own extraction gives the same points in the order of a parallel hash map, another each
-time, and leaves a surface out that runs through voxels exactly; here blocks come in the order of
-their places.
-"""
+Points come in the order of the blocks' places. Open3D's own extraction has another order each
+time, and leaves out a surface that runs exactly through voxels."""
 
 from __future__ import annotations
 
@@ -24,12 +22,8 @@ _X, _Y, _Z = 1, 1 << _BITS, 1 << (2 * _BITS)
 
 
 def surface_points(field: BlockedField, min_weight: float) -> PointCloud:
-    """The points of the zero level, with colours and normals, block by block.
-
-    Args:
-        field: Distance field of the ground map.
-        min_weight: Weight up to which a voxel counts as unknown.
-    """
+    """Points of the zero level with colours and normals, block by block.
+    Voxels of a weight up to `min_weight` count as unknown."""
     words = ((field.places.astype(np.int64) + _BIAS) * (_X, _Y, _Z)).sum(axis=1)
     order = np.argsort(words)
     places, rows = field.places[order], field.rows[order]
@@ -46,11 +40,8 @@ def surface_points(field: BlockedField, min_weight: float) -> PointCloud:
 
 @njit(cache=True, parallel=True, nogil=True)
 def neighbours(words: I64) -> I32:
-    """(N, 27) index of each block's neighbours (itself in the middle), -1 where there is none.
-
-    Args:
-        words: (N,) the blocks' places, ascending.
-    """
+    """(N, 27) index of the neighbours of blocks at ascending `words`, -1 where there is none.
+    Each block itself is in the middle."""
     table = np.full((len(words), 27), np.int32(-1), np.int32)
     for block in prange(len(words)):
         for line in range(9):
@@ -76,14 +67,8 @@ def _range_of(step: int) -> tuple[int, int, int]:
 
 @njit(cache=True)
 def _surround(values: F32, rows: I32, near: I32, cube: F32) -> None:
-    """A block's voxels with some of those around it, NaN where no block is.
-
-    Args:
-        values: (C, 8, 8, 8) values of all blocks.
-        rows: (N,) rows of the blocks, as in `BlockedField`.
-        near: (27,) the block's neighbours.
-        cube: (11, 11, 11) result, `BEFORE` voxels before the block and `BEHIND` behind it.
-    """
+    """A block's voxels in `cube` (11, 11, 11), with those around, NaN where no block is.
+    `cube` starts `BEFORE` voxels before the block; `near` are its 27 neighbours."""
     cube[:] = np.nan
     for number in range(27):
         block = near[number]
@@ -119,8 +104,7 @@ def find_crossings(
     """Which edges between known voxels change their sign.
 
     Args:
-        tsdf, weight: (C, 512) arrays of `BlockedField`, flat: what a block adds to the index of its
-            voxels along x, y and z is 1, 8 and 64.
+        tsdf, weight: (C, 512) arrays of `BlockedField`, flat: x, y, z step by 1, 8, 64.
         rows: (N,) rows of the blocks, as in `BlockedField`.
         beside: (N, 27) the blocks' neighbours.
         min_weight: Weight up to which a voxel counts as unknown.
@@ -173,16 +157,8 @@ def _difference(cube: F32, x: int, y: int, z: int, axis: int) -> np.float32:
 def _crossing(
     cube: F32, x: int, y: int, z: int, axis: int
 ) -> tuple[np.float32, tuple[np.float32, np.float32, np.float32]]:
-    """Where an edge crosses the zero level, and the gradient there, both linear along the edge.
-
-    Args:
-        cube: A block's voxels and those around it (see `_surround`).
-        x, y, z: The edge's first voxel in the cube.
-        axis: Axis of the edge, 0 to 2 for x, y, z.
-
-    Returns:
-        The place on the edge, from 0 to 1, and the unit normal, towards free space.
-    """
+    """Place from 0 to 1 on the edge x, y, z, `axis` in `cube` where it crosses the zero level, and
+    the unit normal there, towards free space; both linear along the edge."""
     i, j, k = x + (axis == 0), y + (axis == 1), z + (axis == 2)
     share = cube[z, y, x] / (cube[z, y, x] - cube[k, j, i])
     rest = np.float32(1) - share

@@ -1,8 +1,7 @@
 """Blocks of a distance field that a depth image measures (Sec. IV).
 
-What Open3D calls `compute_unique_block_coordinates`, and the same blocks; it gathers them in a
-hash set, where a box of marks around the view is enough.
-"""
+They equal those of Open3D's `compute_unique_block_coordinates`. A box of marks around the view
+replaces its hash set."""
 
 from __future__ import annotations
 
@@ -64,8 +63,7 @@ def blocks_along_rays(
     """Room for blocks (M, 3) on both sides of what each pixel measured, and their number.
 
     Arguments are as of `touched_blocks`; `inverse` (4,) holds 1 / fx, 1 / fy, cx, cy, and
-    `T_map_camera` (3, 4) the upper rows of the pose.
-    """
+    `T_map_camera` (3, 4) the upper rows of the pose."""
     rows, columns = depth.shape[0] // STRIDE, depth.shape[1] // STRIDE
     blocks = np.empty((rows * columns * (STEPS + 1), 3), np.int32)
     r00, r01, r02, x0 = T_map_camera[0]

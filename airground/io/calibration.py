@@ -1,8 +1,7 @@
 """The calibration of both robots' sensors as it stands in TOML files.
 
-The same tables hold the nominal calibration (`recording.toml`) and, in simulation, the true
-one, which lies elsewhere and is never read here.
-"""
+`recording.toml` holds the nominal calibration in these tables; a simulation keeps the true one
+elsewhere, in the same form."""
 
 from __future__ import annotations
 

@@ -70,10 +70,7 @@ def _listing(folder: Path) -> list[Path]:
 
 def listed_files(folder: Path, names: Iterable[str], list_path: Path) -> list[Path]:
     """The files below `folder` that the list at `list_path` names.
-
-    Raises:
-        RecordingError: A name leads out of the folder, as in a list from elsewhere.
-    """
+    RecordingError if a name leads out of the folder."""
     files = []
     for name in names:
         path = PurePosixPath(name)

@@ -1,8 +1,7 @@
 """Lens distortion, removed from images as they are read.
 
-Every image becomes one of a pinhole camera of the same size, in which no pixel lies outside the
-original image: a black rim would look like structure to a tracker.
-"""
+The result is a pinhole image of the same size without black rims, which a tracker would take for
+structure."""
 
 from __future__ import annotations
 
@@ -64,10 +63,8 @@ class Undistortion:
         return np.asarray(cv2.remap(image, *self._maps, cv2.INTER_LINEAR), np.uint8)
 
     def depth(self, depth: F32) -> F32:
-        """(H, W) [m]; nearest pixel, so that neither edges nor holes (NaN) are blurred.
-
-        Depth along the optical axis is the same in both cameras: their axes coincide.
-        """
+        """(H, W) depth [m] by the nearest pixel: neither edges nor holes (NaN) are blurred.
+        Both cameras share the optical axis, hence the depth along it."""
         if self._nearest is None:
             return depth
         nothing = np.zeros((0, 0), np.uint16)

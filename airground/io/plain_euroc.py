@@ -4,8 +4,7 @@
     mav0/imu0/{sensor.yaml,data.csv}               may be missing
     mav0/mag0/data.csv                             may be missing
 
-The body of `T_BS` is in general not level: gravity defines a body whose z axis points up.
-"""
+The body of `T_BS` is in general not level: gravity defines a body whose z axis points up."""
 
 from __future__ import annotations
 
@@ -104,8 +103,7 @@ class Inertial:
     """An IMU beside a camera.
 
     Attributes:
-        samples: All samples.
-        noise: Noise densities from `sensor.yaml`.
+        samples, noise: All samples, and noise densities from `sensor.yaml`.
         T_imu_camera: Pose of the camera in the IMU's frame.
         up_imu: (3,) unit vector against gravity in the IMU's frame at the first samples.
     """
@@ -118,12 +116,7 @@ class Inertial:
 
 def read_inertial(folder: Path, T_body_camera: SE3, camera_stamps_ns: I64) -> Inertial:
     """Read the folder `imu0`, and check that it fits the images; raises like `open_euroc`.
-
-    Args:
-        folder: The folder `imu0`.
-        T_body_camera: Pose of the camera in the body of `T_BS`.
-        camera_stamps_ns: (N,) stamps of the images [ns].
-    """
+    `T_body_camera` is the camera's pose in the body of `T_BS`, `camera_stamps_ns` (N,)."""
     imu_file, sensor_file = folder / "data.csv", folder / "sensor.yaml"
     T_imu_camera = _in_imu(read_pose(sensor_file), T_body_camera)
     samples = read_imu(imu_file)

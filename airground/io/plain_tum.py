@@ -7,8 +7,7 @@
 
 The folders have no calibration: the published one of the Kinect in the folder's name is used,
 or a file. Without a gyro a recording has no IMU; the accelerometer then gives only the
-direction of gravity at the start.
-"""
+direction of gravity at the start."""
 
 from __future__ import annotations
 
@@ -95,8 +94,8 @@ def open_tum(
 ) -> RobotRecording[Any]:
     """Open a folder of colour and depth images and check all but the images.
 
-    Colour and depth are paired by their stamps, one to one, nearest first, at most 20 ms
-    apart; a frame has the stamp of its colour image. Images without a partner are left out.
+    Colour and depth are paired by `associate`, at most 20 ms apart; a frame has the stamp of its
+    colour image. Images without a partner are left out.
 
     Args:
         path: The folder with `rgb.txt`.

@@ -1,7 +1,6 @@
 """Checks of sensor data from any source: units, cover, gravity, rigid poses.
 
-Every error is one line that names the file, what is wrong and what would be right.
-"""
+Every error is one line that names the file, what is wrong and what would be right."""
 
 from __future__ import annotations
 
@@ -39,7 +38,7 @@ def check_stamp_unit(stamps_ns: I64, path: Path, unit: str, steps_s: tuple[float
     """RecordingError if the stamps tick as if they were written in another unit than `unit`.
 
     Args:
-        stamps_ns: (N,) stamps as read, if the file is in `unit` [ns].
+        stamps_ns: (N,) stamps of the file at `path`, read as if it were in `unit` [ns].
         path: The file, for the message.
         unit: "nanoseconds" or "seconds": what the format prescribes.
         steps_s: Shortest and longest step that the sensor can have [s].
@@ -67,13 +66,7 @@ def check_imu_covers(
     imu: ImuSamples, imu_path: Path, camera_stamps_ns: I64, offset_ns: int = 0
 ) -> None:
     """RecordingError unless inertial samples reach from the first image to the last.
-
-    Args:
-        imu: All inertial samples.
-        imu_path: Their file, for the message.
-        camera_stamps_ns: (N,) stamps of the images [ns].
-        offset_ns: Offset from the camera's clock to the IMU's [ns].
-    """
+    `offset_ns` leads from the camera's clock to the IMU's [ns]."""
     first, last = int(camera_stamps_ns[0]) + offset_ns, int(camera_stamps_ns[-1]) + offset_ns
     late_s = (int(imu.stamps_ns[0]) - first) / 1e9
     early_s = (last - int(imu.stamps_ns[-1])) / 1e9
@@ -88,9 +81,7 @@ def check_imu_covers(
 
 def upwards(imu: ImuSamples, imu_path: Path) -> F64:
     """(3,) unit vector that points up in the IMU as the recording starts.
-
-    RecordingError if the accelerometer does not read gravity in m/s^2.
-    """
+    RecordingError if the accelerometer does not read gravity in m/s^2."""
     usual = float(np.median(np.linalg.norm(imu.accelerometer, axis=1)))
     low, high = GRAVITY_RANGE
     if not low <= usual <= high:
@@ -106,10 +97,7 @@ def upwards(imu: ImuSamples, imu_path: Path) -> F64:
 
 def check_up_in_camera(up_camera: F64, imu_path: Path) -> None:
     """RecordingError if gravity has the wrong sign for a camera that looks ahead or down.
-
-    However it is pitched between straight ahead and straight down, up in the image's axes
-    is within 45 degrees of (0, -1, -1): above the image, or behind the camera.
-    """
+    For any pitch between the two, up in the camera is within 45 degrees of (0, -1, -1)."""
     cosine = float(up_camera @ np.array([0.0, -1.0, -1.0])) / np.sqrt(2.0)
     if cosine < UPSIDE_DOWN:
         raise RecordingError(
@@ -149,11 +137,8 @@ def rigid(numbers: ArrayLike, path: Path, key: str) -> SE3:
 
 
 def level_body(up_imu: F64, T_imu_camera: SE3) -> SE3:
-    """T_body_imu of a body at the IMU: z up as given, x where the camera looks, levelled.
-
-    Plain folders do not say how their sensors sit in a body with z up; where the camera
-    looks straight down, x is where the image's top points. `up_imu` (3,) is a unit vector.
-    """
+    """T_body_imu of a body at the IMU: z along the unit vector `up_imu` (3,), x where the camera
+    looks, levelled; where it looks straight down, x is where the image's top points."""
     _, y_camera, z_camera = T_imu_camera.rotation.T
     ahead = z_camera - y_camera
     forward = ahead - (ahead @ up_imu) * up_imu

@@ -43,9 +43,7 @@ def write_ply(path: Path | str, cloud: PointCloud, sources: U8 | None = None) ->
 
 def read_ply(path: Path) -> tuple[PointCloud, U8 | None]:
     """Read what `write_ply` wrote: the cloud, and the sources if they are in the file.
-
-    InputError if the file is missing, truncated, or holds another kind of PLY.
-    """
+    InputError if the file is missing, truncated, or holds another kind of PLY."""
     try:
         data = path.read_bytes()
     except OSError as error:

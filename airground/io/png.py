@@ -1,9 +1,7 @@
 """Decoding the PNG images that recordings hold, about twice as fast as libpng does.
 
-Most of what libpng takes for a camera's image goes into inflating it, which Intel's ISA-L
-does faster; what remains is to undo the filters of the rows. Only the kinds of PNG that a
-recording uses are decoded here: grey of 8 or 16 bits and RGB of 8, not interlaced.
-"""
+Intel's ISA-L inflates them; the filters of the rows are undone here. Only grey of 8 or 16 bits and
+RGB of 8 bits, not interlaced, are decoded."""
 
 from __future__ import annotations
 
@@ -26,12 +24,7 @@ _KINDS = {(_GREY, 8): 1, (_GREY, 16): 2, (_RGB, 8): 3}
 
 @dataclass(frozen=True)
 class PngHeader:
-    """Size and kind of an image, by the file's header.
-
-    Attributes:
-        width, height: Size of the image [px].
-        pixel_bytes: Bytes per pixel; None for a kind of PNG that is not decoded here.
-    """
+    """Size of an image [px] and its bytes per pixel, None for a kind that is not decoded here."""
 
     width: int
     height: int
@@ -53,10 +46,7 @@ class PngHeader:
 
 
 def decode_png(data: bytes) -> NDArray[Any]:
-    """The image in a PNG file.
-
-    Returns:
-        (height, width) uint8 or uint16, or (height, width, 3) uint8 RGB.
+    """The image in a PNG file: (height, width) uint8 or uint16, or (height, width, 3) uint8 RGB.
 
     Raises:
         ValueError: The file is damaged, or of a kind that is not decoded here.

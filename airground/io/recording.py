@@ -34,13 +34,7 @@ class Recording(Pair):
     """What both robots sensed, without the truth.
 
     Inertial and magnetic samples are read when the recording is opened (about 15 kB per
-    second of recording); images are read one by one, when they are needed.
-
-    Attributes:
-        path: The recording's folder.
-        header: Contents of `recording.toml`.
-        images: Source of the images.
-    """
+    second of recording); images are read one by one, when they are needed."""
 
     path: Path
     header: Header

@@ -54,12 +54,7 @@ def write_ground(
 
 def finish(root: Path, header: Header, image_digests: Mapping[str, Mapping[str, str]]) -> None:
     """Write `recording.toml`, the last file, with the digests of all others.
-
-    Args:
-        root: The recording's folder.
-        header: Contents of the file without the digests.
-        image_digests: SHA-256 of every image by image folder and file name.
-    """
+    `header` lacks the digests; `image_digests` are SHA-256 by image folder and file name."""
     digests = {folder: folder_digest(files) for folder, files in image_digests.items()}
     for path in sorted(root.rglob("*")):
         relative = path.relative_to(root)

@@ -39,11 +39,7 @@ class Bundler:
     """Puts the samples since the previous image before each image.
 
     A bundle has at most one message of inertial and one of magnetic samples. The samples of an
-    image that is left out go into the bundle of the next one.
-
-    Attributes:
-        robot: The robot that sends the messages.
-        imu, magnetic: All samples of its sensors; None without such a sensor.
+    image that is left out go into the next bundle. `imu` and `magnetic` are None without such a sensor.
     """
 
     robot: Source
@@ -74,8 +70,7 @@ class RobotRecording(Generic[Image]):
         robot: The robot that recorded it, or whose place it takes.
         calibration: The nominal calibration, as front ends use it.
         camera_stamps: (N,) int64 stamps of the images [ns].
-        imu: All inertial samples; None without a gyro.
-        magnetic: All magnetometer samples; None without a magnetometer.
+        imu, magnetic: All samples; None without a gyro or without a magnetometer.
         read_image: Reads the image at an index of `camera_stamps`.
         pose_frame: Frame whose poses the publisher states as truth: "body", "imu" or "camera".
         T_pose_camera: Pose of the camera in that frame, to write comparable trajectories.
@@ -125,9 +120,7 @@ class RobotRecording(Generic[Image]):
         self, pool: ThreadPoolExecutor, dropped: Collection[int] = ()
     ) -> Iterator[tuple[int, list[Stamped]]]:
         """Each image's stamp, and the image after the samples since the one before it.
-
-        The pool reads images ahead; those with `dropped` stamps [ns] are left out.
-        """
+        The pool reads images ahead; those with `dropped` stamps [ns] are left out."""
         bundler = self.bundler()
         stamps = self.camera_stamps.tolist()
         kept = [index for index, stamp in enumerate(stamps) if stamp not in dropped]
@@ -137,14 +130,11 @@ class RobotRecording(Generic[Image]):
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """What a MAV and a ground robot sensed, stamped by the same clock.
-
-    Attributes:
-        mav, ground: Recording of each robot.
+    """Recordings of a MAV and of a ground robot, stamped by the same clock.
 
     Raises:
-        RecordingError: The ground robot begins after the MAV has ended, so that there is no
-            map to locate the MAV in.
+        RecordingError: The ground robot begins after the MAV has ended: there is no map to
+            locate the MAV in.
     """
 
     mav: RobotRecording[MavImage]
@@ -171,9 +161,8 @@ class Pair:
         of the same robot, one message each unless there are none.
 
         Args:
-            dropped: Stamps [ns] of images to leave out, as a busy robot would; their samples
-                come before the next image.
-            robots: Robots whose messages are wanted; at equal stamps the first one's come first.
+            dropped: Stamps [ns] of images to leave out; their samples come before the next image.
+            robots: Robots to read; at equal stamps the first one's messages come first.
 
         Raises:
             RecordingError: An image cannot be read or does not fit the calibration.

@@ -35,11 +35,8 @@ class _PlainLoader(yaml.SafeLoader):  # type: ignore[misc]  # yaml has no types
 def read_mapping(path: Path) -> dict[str, Any]:
     """The keys and values of a YAML file, or of a TOML file by its suffix.
 
-    EuRoC's first line, `%YAML:1.0`, is OpenCV's spelling and no YAML: it is passed over.
-
-    Raises:
-        RecordingError: The file is missing, or is no table of keys and values.
-    """
+    EuRoC's first line, `%YAML:1.0`, is no YAML and is skipped. RecordingError if the file is
+    missing, or is no table of keys and values."""
     lines = read_lines(path)
     try:
         if path.suffix == ".toml":
@@ -59,9 +56,7 @@ def read_mapping(path: Path) -> dict[str, Any]:
 
 def read_lens(path: Path) -> Lens:
     """Read `resolution`, `intrinsics`, `distortion_model` and `distortion_coefficients`.
-
-    RecordingError names the file, the key and what would be right.
-    """
+    RecordingError names the file, the key and what would be right."""
     values = read_mapping(path)
     model = values.get("camera_model", "pinhole")
     if model != "pinhole":

@@ -1,7 +1,6 @@
 """TUM text files: trajectories, image lists, associations, accelerometer samples.
 
-Times are in seconds with nine decimals; they are read and written without rounding.
-"""
+Times are in seconds with nine decimals; they are read and written without rounding."""
 
 from __future__ import annotations
 
@@ -28,11 +27,7 @@ def format_stamp(stamp_ns: int) -> str:
 
 def parse_stamp(text: str) -> int:
     """Nanoseconds from seconds such as '12', '12.5' or '1305031102.175304'; exact.
-
-    Raises:
-        ValueError: The text is no plain decimal number with up to nine decimals, or is
-            too large for seconds.
-    """
+    ValueError if the text is no plain decimal number with up to nine decimals, or too large."""
     whole, _, decimals = text.partition(".")
     if not whole.isdecimal() or len(decimals) > 9 or (decimals and not decimals.isdecimal()):
         raise ValueError(f"'{text}' is no time in seconds with at most nine decimals")
@@ -120,10 +115,7 @@ def write_accelerometer(path: Path, samples: ImuSamples) -> None:
 
 def _read_stamped(path: Path, columns: str) -> tuple[I64, list[list[str]]]:
     """Stamps (N,) [ns] and the fields of each line, as many as `columns` names.
-
-    Raises:
-        RecordingError: Names the file and the line or stamp that is wrong.
-    """
+    RecordingError names the file and the line or stamp that is wrong."""
     stamps, rows = [], []
     for number, line in _entries(path):
         fields = line.split()

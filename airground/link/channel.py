@@ -1,9 +1,7 @@
 """A one-way channel over a loopback socket whose sender never blocks.
 
-The receiver acknowledges each message once it is processed. The sender therefore knows how many
-are under way and can drop messages instead of blocking or filling the memory. If one side dies,
-the other one only receives nothing more.
-"""
+The receiver acknowledges each processed message. The sender can so drop messages instead of
+filling the memory. If one side dies, the other one only receives nothing more."""
 
 from __future__ import annotations
 
@@ -17,11 +15,7 @@ LINGER_MS = 5000
 
 
 class Sender:
-    """The end that sends.
-
-    Args:
-        address: Address of the receiver.
-        capacity: Most messages under way at a time.
+    """The end that sends, with at most `capacity` messages under way at a time.
 
     Attributes:
         under_way: Messages sent and not yet acknowledged.

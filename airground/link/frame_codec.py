@@ -1,8 +1,6 @@
 """A tracked frame as a message: a header in JSON, then one block of bytes per array.
 
-Numbers and images are kept to the last bit; on demand the MAV's images are compressed as JPEG,
-as its radio needs.
-"""
+Numbers and images are exact; on demand the MAV's images are compressed as JPEG for its radio."""
 
 from __future__ import annotations
 

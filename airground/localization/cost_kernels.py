@@ -1,9 +1,7 @@
 """Sums over the cells where an aerial and a ground height map overlap, and costs from them.
 
-Both costs need six sums over the overlap: the number of cells, the sums of the aerial and
-of the ground heights, of their squares, and of their products. Arrays of sums end in an
-axis of these six, in this order.
-"""
+Arrays of sums end in an axis of six: the number of cells, the sums of the aerial and of the
+ground heights, of their squares, and of their products."""
 
 from __future__ import annotations
 
@@ -31,9 +29,7 @@ def mean_height(heights: F32) -> tuple[float, int]:
 @njit(cache=True, nogil=True, error_model="numpy")
 def about_mean(heights: F32, margin: int) -> tuple[F32, F32, float]:
     """Heights (nx, ny) [m] with NaN in holes as heights about their mean, 0 in holes; mask; mean.
-
-    The first two have an empty border, `margin` cells wide.
-    """
+    The first two have an empty border, `margin` cells wide."""
     nx, ny = heights.shape
     mean, _ = mean_height(heights)
     centred = np.zeros((nx + 2 * margin, ny + 2 * margin), np.float32)
@@ -69,10 +65,7 @@ def zmssd(sums: Floats, min_count: float) -> F32:
 @njit(cache=True, nogil=True, error_model="numpy")
 def one_minus_correlation(sums: Floats, min_count: float, min_relief_m: float) -> F32:
     """1 - normalized correlation for sums (N, 6); NaN where fewer than `min_count` overlap.
-
-    Standard deviations below `min_relief_m` are replaced by it: the noise of flat ground
-    correlates with nothing.
-    """
+    Lower standard deviations are raised to `min_relief_m`: noise of flat ground fits nothing."""
     floor = min_relief_m * min_relief_m
     costs = np.empty(len(sums), np.float32)
     for i in range(len(sums)):
@@ -93,9 +86,8 @@ def sums_at_positions(
 ) -> F64:
     """The six sums (M, 6) for M fractional shifts of one map over another.
 
-    Ground heights are interpolated bilinearly between the filled ones of four cells, and
-    count where these carry at least half of the weight; so a whole shift counts the same
-    cells as the cost map.
+    Ground heights are interpolated bilinearly between the filled ones of four cells, if these carry
+    at least half of the weight; a whole shift counts the same cells as the cost map.
 
     Args:
         aerial, ground: Heights [m] with 0 in holes.

@@ -30,9 +30,7 @@ from airground.localization.turned_kernels import MARGIN, filled_cells, in_fours
 @dataclass(frozen=True, eq=False)
 class Masked:
     """Heights about their mean with 0 in holes, and the mask of the filled cells.
-
-    float32 sums of squares lose the small differences that matter unless means go first.
-    """
+    float32 sums of squares lose small differences unless the mean is subtracted first."""
 
     heights: F32
     mask: F32
@@ -63,8 +61,7 @@ class OffsetSearch:
         ground: Height map in the frame `ground`.
         centre: (2,) middle of the searched square [m].
         radius_m: Half its side [m].
-        reach_cells: (2, 2) first and last lattice index (from the camera) that aerial maps
-            may have.
+        reach_cells: (2, 2) first and last lattice index from the camera of an aerial map.
     """
 
     def __init__(
@@ -120,10 +117,8 @@ class OffsetSearch:
         return result
 
     def _correlate(self, product: C64, out: F32) -> None:
-        """`irfft2` of a product of spectra, not spent on rows that are no offset.
-
-        The product's memory is used up: fresh memory costs as much as multiplying does.
-        """
+        """`irfft2` of a product of spectra, for the rows of offsets only.
+        The product is overwritten: fresh memory costs as much time as the multiplication."""
         rows, columns = self._fft_shape
         spectra = fft.ifft(product, axis=0, norm="forward", overwrite_x=True)
         lines = fft.irfft(spectra[: len(out)], columns, axis=1, norm="forward", overwrite_x=True)
@@ -227,15 +222,8 @@ def overlay_turned(aerial: HeightMap, ground: HeightMap, poses: F64) -> Overlays
 
 
 def _within_reach(ground: HeightMap, places: F64, reach_cells: I64) -> tuple[F32, I64]:
-    """The ground heights that aerial maps about these places can lie on, and their first cell.
-
-    Particles gather; preparing all of the ground map for them would take longer than using it.
-
-    Args:
-        ground: The whole ground height map.
-        places: (M, 2) places on its lattice [cells].
-        reach_cells: (2, 2) reach as for `OffsetSearch` [cells].
-    """
+    """Ground heights that aerial maps at `places` (M, 2) [cells] can reach, and their first cell.
+    Particles gather: to prepare the whole ground map would take longer than to use it."""
     edge = lattice_index(ground)
     low = np.floor(places.min(axis=0)).astype(np.int64) + reach_cells[0] - edge
     high = np.floor(places.max(axis=0)).astype(np.int64) + reach_cells[1] + 2 - edge

@@ -20,13 +20,10 @@ PLACE_M, PLACE_RAD = 0.1, np.deg2rad(10.0)
 class HeadingEstimator:
     """A robust running average of the magnetic field's direction in a gravity-aligned map.
 
-    Iron nearby bends the field, by the same amount as long as the robot stays: the n-th sample
-    at a place counts 1/n, or minutes on the floor would outvote all of a flight.
+    Iron nearby bends the field as long as the robot stays: the n-th sample at a place counts 1/n.
 
-    Directions go into a histogram over the circle, so that memory does not grow; the
-    average is taken around its densest place. A disturbance that lasts a minority of the
-    time then leaves no trace, where a plain mean would bend towards it.
-    """
+    Directions go into a histogram over the circle; the average is taken around its densest place.
+    A disturbance during a minority of the time leaves no trace, unlike in a plain mean."""
 
     def __init__(self) -> None:
         self._samples = 0

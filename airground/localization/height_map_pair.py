@@ -18,10 +18,9 @@ from airground.localization.hypotheses import CostVolume, search_headings, searc
 
 @dataclass(frozen=True, eq=False)
 class HeightMapPair:
-    """An aerial surface and the ground map of its time, and all that follows from these two.
+    """An aerial surface and the ground map of its time, for one or several filters.
 
-    Several filters may take in the same one. What is costly is computed when it is first asked
-    for, and kept.
+    Height maps are computed on first use, and kept.
 
     Attributes:
         stamp_ns: Stamp of the surface [ns].
@@ -48,11 +47,8 @@ class HeightMapPair:
 
     @cached_property
     def turn(self) -> float:
-        """Turn of `mav` that the aerial height map is made for [rad]; 0 where it is searched.
-
-        Raises:
-            InputError: It is needed and unknown.
-        """
+        """Turn of `mav` for the aerial height map [rad]; 0 where it is searched.
+        InputError if it is needed and unknown."""
         if self.searched:
             return 0.0
         if self.heading is None or not np.isfinite(self.heading):
@@ -106,8 +102,8 @@ def aerial_height_map(
         config: Resolution and hole filling.
 
     Returns:
-        x and y relative to the camera along the axes of `ground`: the map lies at a
-        hypothesis u once u is added to its origin. Heights stay those of `mav`.
+        x and y relative to the camera along the axes of `ground`, to which a hypothesis u is
+        added; heights as in `mav`.
     """
     c, s = np.cos(heading), np.sin(heading)
     offsets = np.asarray(points_mav, np.float64)[:, :2] - np.asarray(position_mav)[:2]

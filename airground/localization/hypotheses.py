@@ -73,9 +73,8 @@ def search_headings(
 ) -> CostVolume:
     """Every position for headings all around, coarse to fine.
 
-    Headings 4 degrees apart are searched first; between the most promising of them all
-    are. Costs are exact for each heading that the volume holds. The aerial map is for heading 0.
-    """
+    First every 4 degrees, then all between the most promising ones. Costs are exact for each
+    heading in the volume. The aerial map is for heading 0."""
     cells = _cells(aerial)
     reach = (
         int(np.ceil(np.linalg.norm(cells[:, :2], axis=1).max(initial=0) * aerial.cells_per_m)) + 1

@@ -1,7 +1,6 @@
 """Monte Carlo localization of the MAV in the ground robot's map (Sec. VI-B).
 
-Whether a belief may claim a position: Sec. VIII-C, and what the paper leaves open.
-"""
+Whether a belief may claim a position: Sec. VIII-C, and what the paper leaves open."""
 
 from __future__ import annotations
 
@@ -93,9 +92,7 @@ class MonteCarloLocalizer:
 
     def _redraw(self, particles: F64, volume: CostVolume | None) -> F64:
         """Replace a share of the particles by draws from the current cost map.
-
-        They join after the belief was summarized: the next aerial map judges them first.
-        """
+        They join after the belief was summarized: the next aerial map judges them first."""
         count = round(self._local.redrawn_fraction * len(particles))
         if volume is None or not volume.feasible or count == 0:
             return particles
@@ -137,12 +134,11 @@ def motion_at(estimate: F64, position_mav: F64, height_offset: float) -> SE3:
 def why_refused(overlay: Overlays, agreed: Agreement, particles: F64, config: Localization) -> str:
     """The reason, in one line, why no position is claimed; empty if one is.
 
-    The particles' covariance says whether they agree with each other, not whether they are
-    right: the rest asks whether the maps fit at the estimate, better than beside it.
+    The covariance says whether particles agree with each other, not whether they are right: the
+    rest asks whether the maps fit at the estimate, better than beside it.
 
     Args:
-        overlay: Overlap of the newest aerial map with the ground map at the estimate.
-        agreed: Agreement of the maps at the estimate.
+        overlay, agreed: Overlap and agreement of the two maps at the estimate.
         particles: (M, 3) particles: x, y [m] and heading [rad].
         config: Section `localization` of the configuration.
     """

@@ -26,10 +26,8 @@ def span(costs: Floats) -> float:
 def weights(costs: Floats, sigma: float) -> F64:
     """(M,) normalized weights of particles by their costs.
 
-    A particle outside the overlap rule (NaN) gets the median weight of the others: one map
-    that overlaps too little must not kill the right hypothesis. Where nothing overlaps
-    enough, all weigh the same.
-    """
+    A particle outside the overlap rule (NaN) gets the median weight of the others: one map with too
+    little overlap must not remove the right hypothesis. All are equal where no cost is known."""
     weight = likelihoods(costs, sigma)
     feasible = np.isfinite(weight)
     if not feasible.any():

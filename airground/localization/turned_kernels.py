@@ -1,8 +1,7 @@
 """Sums over the overlap of a turned aerial height map with the ground's (see `cost_kernels`).
 
-Turned, each aerial cell falls between four others of the ground map. Looking these up would
-take most of the time, so every four lie in memory side by side: two loads, from one place.
-"""
+A turned aerial cell falls between four cells of the ground map. Each four lie side by side in
+memory: looking them up would take most of the time."""
 
 from __future__ import annotations
 
@@ -20,11 +19,9 @@ MARGIN = 2
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def filled_cells(heights: F32, first_x: int, first_y: int) -> tuple[F32, float]:
-    """The filled cells of an aerial map (3, K): x, y [cells], height about the mean; the mean.
+    """The filled cells (3, K) of an aerial map: x, y [cells], height about the mean; the mean.
 
-    Args:
-        heights: (nx, ny) heights [m], NaN in holes.
-        first_x, first_y: Position of cell [0, 0] relative to the camera [cells].
+    `heights` (nx, ny) [m] have NaN in holes; cell [0, 0] is `first_x`, `first_y` from the camera.
     """
     mean, count = mean_height(heights)
     cells = np.empty((3, count), np.float32)
@@ -40,12 +37,10 @@ def filled_cells(heights: F32, first_x: int, first_y: int) -> tuple[F32, float]:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def in_fours(heights: F32) -> tuple[F32, float]:
-    """Ground heights (nx, ny) [m] about their mean, each with those beside and behind.
+    """Ground heights (nx, ny) [m] about their mean, each with its neighbours; the mean [m].
 
-    Returns:
-        (nx + 4, ny + 4, 4): each cell, the next of its row, and the two behind these in the next
-        row; NaN in holes and in `MARGIN` cells around. And the mean [m].
-    """
+    The result is (nx + 4, ny + 4, 4): each cell, the next of its row, and the two behind these in
+    the next row; NaN in holes and in `MARGIN` cells around."""
     mean, _ = mean_height(heights)
     nx, ny = heights.shape
     rows, columns = nx + 2 * MARGIN, ny + 2 * MARGIN

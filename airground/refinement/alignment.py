@@ -23,11 +23,7 @@ def refine(
     stamp_ns: int, T_ground_mav_start: SE3, aerial: PointCloud, ground: PointCloud, config: Config
 ) -> Alignment:
     """Align an aerial cloud in the frame `mav` with the ground map in the frame `ground`.
-
-    Returns:
-        The refined motion and whether it may be used. Clouds that are too small or do not
-        overlap give a refusal with the start unchanged, never an exception.
-    """
+    Clouds that are too small or do not overlap give a refusal with the start unchanged."""
     settings = config.refinement
     for name, cloud in (("aerial", aerial), ("ground", ground)):
         if len(cloud) < MIN_POINTS:

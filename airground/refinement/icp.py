@@ -20,10 +20,7 @@ SPARSE, SPARSE_ABOVE_M = 3, 0.1
 
 def point_to_plane_icp(source: F64, target: Surfels, start: SE3, config: Refinement) -> SE3:
     """Move points (N, 3) [m] until the distances along the target's normals are least.
-
-    Returns:
-        T_target_source; the last motion found where the correspondences do not suffice.
-    """
+    Returns T_target_source; the last motion found where the correspondences do not suffice."""
     motion = start
     distance = config.max_distance_m
     # The distance falls by a constant factor over two thirds of the steps, then stays.

@@ -19,13 +19,9 @@ MIN_CELLS = 50
 def search_nearby(aerial: F64, ground: F32, start: SE3, config: Refinement) -> SE3 | None:
     """The level motion T_ground_aerial around a start whose height maps agree best.
 
-    Searches shifts within the configured radius and a few degrees of heading, turned about
-    the middle of the aerial points; the height follows from the mean difference (Delta z
-    of Sec. VI-A).
-
-    Returns:
-        The motion, of whose rotation only a heading is left; None where the maps do not overlap.
-    """
+    Searches shifts within the configured radius and a few degrees of heading, turned about the
+    middle of the aerial points; the height follows from the mean difference (Delta z of Sec. VI-A).
+    None where the maps do not overlap."""
     cells_per_m = config.local_search_cells_per_m
     ground_map = make_height_map(ground, cells_per_m)
     reach = int(np.ceil(config.local_search_radius_m * cells_per_m))

@@ -15,13 +15,8 @@ NEIGHBOURS = 10
 
 @dataclass(frozen=True, eq=False)
 class Surfels:
-    """Points with normals, and a tree to find the nearest.
-
-    Attributes:
-        points: (N, 3) float64 points [m].
-        normals: (N, 3) float64 unit vectors, z up; zero where the plane is unknown.
-        tree: Nearest-neighbour tree over `points`.
-    """
+    """(N, 3) float64 points [m] with unit normals, z up, and their nearest-neighbour tree.
+    A normal is zero where the plane is unknown."""
 
     points: F64
     normals: F64
