@@ -13,8 +13,7 @@ from contextlib import contextmanager
 @contextmanager
 def deaf_children() -> Iterator[None]:
     """Processes that start in here leave Ctrl-C to their parent, from their first import on.
-
-    Off the main thread nothing changes, for only that may set how signals are handled.
+    Off the main thread nothing changes: only the main thread may set signal handlers.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

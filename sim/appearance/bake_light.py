@@ -1,8 +1,7 @@
-"""Light that is worked out once: soft shadows and bounced light on a world that stands still.
+"""Soft shadows and bounced light of a static world, worked out once.
 
-A shadow map is sharp, jagged and drawn anew for every frame. Here rays to an extended lamp and
-to the whole hemisphere give the irradiance at surface points; pictures carry it from then on,
-so that a frame costs no lighting at all.
+Rays to an extended lamp and to the whole hemisphere give the irradiance at surface points.
+Pictures carry it from then on, so that a frame costs no lighting.
 """
 
 from __future__ import annotations
@@ -33,13 +32,7 @@ _BOUNCE = 0.55
 
 @dataclass(frozen=True)
 class LightBaker:
-    """Casts rays in a world whose every triangle has a mean colour.
-
-    Attributes:
-        light: Lamps and ambient light.
-        caster: Holds the triangles.
-        albedo: (T, 3) mean linear reflectance of the triangles.
-    """
+    """Casts rays in a world; `albedo` is (T, 3) mean linear reflectance of its triangles."""
 
     light: Light
     caster: RayCaster
@@ -52,9 +45,7 @@ class LightBaker:
     def shade(self, points: NDArray, normals: NDArray) -> NDArray[np.float32]:
         """(N, 3) factors for display values (gamma 2.2) of a surface lit by this light.
 
-        Args:
-            points: (N, 3) on the surface [m].
-            normals: (N, 3) unit normals, outward.
+        `points` (N, 3) are on the surface [m], `normals` (N, 3) are outward unit vectors.
         """
         pieces = [
             self._irradiance(points[k : k + _CHUNK], normals[k : k + _CHUNK])

@@ -1,7 +1,7 @@
 """Generated pictures of cardboard: every face of every box its own.
 
-A face is painted in true proportion (square pixels), from the board up: board, creases, print,
-tape, labels, wear. It is stretched to the square that a cube texture wants at the very end.
+A face is painted in true proportion (square pixels): board, creases, print, tape, labels, wear.
+Only at the end it is stretched to the square of a cube texture.
 """
 
 from __future__ import annotations
@@ -39,10 +39,8 @@ class Make:
 
     Attributes:
         board, ink, accent, tape: Display colours, 0 to 255 RGB.
-        brand: Name on the box.
-        mark: Name of the trade mark.
         weight: Boldness of the lettering.
-        layout: Seed of where things are printed.
+        layout: Seed of the places of the print.
         band: Whether a band of colour runs around the sides.
     """
 

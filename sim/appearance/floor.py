@@ -16,13 +16,7 @@ _PLASTER: Colour = (196, 193, 184)
 
 
 def paint_concrete(size_m: tuple[float, float], px_per_m: float, rng: np.random.Generator) -> Image:
-    """Worn concrete: (rows, columns, 3) float32 display values, unlit; nothing repeats.
-
-    Args:
-        size_m: Width and height [m].
-        px_per_m: Resolution.
-        rng: Source of every mark.
-    """
+    """Worn concrete without repetition: (rows, columns, 3) float32 display values, unlit."""
     sheet = _blank(size_m, px_per_m, rng)
     _concrete_base(sheet)
     _spots(sheet, 45, (0.03, 0.28), 0.30)

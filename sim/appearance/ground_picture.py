@@ -28,11 +28,7 @@ def paint_ground(
 ) -> NDArray[np.uint8]:
     """Soil, gravel, dry grass, twigs and leaves: (rows, columns, 3) display values, unlit.
 
-    Args:
-        size_m: Extent along x and y [m].
-        px_per_m: Resolution.
-        azimuth_deg: Azimuth of the sun, for the shading of details smaller than the mesh [deg].
-        rng: Source of the whole picture.
+    `azimuth_deg` of the sun shades the details that are smaller than the mesh.
     """
     shape = (round(size_m[1] * px_per_m), round(size_m[0] * px_per_m))
     sun = np.array([np.cos(np.radians(azimuth_deg)), -np.sin(np.radians(azimuth_deg))])
@@ -159,10 +155,7 @@ def _leaves(
 def paint_rock(nodes: NDArray, diameter_m: float, rng: np.random.Generator) -> Image:
     """Mottled, veined stone with lichen: (..., 3) display values at points in space.
 
-    Args:
-        nodes: (..., 3) points on the rock [m], in any frame.
-        diameter_m: Sets how large the mottles are.
-        rng: Source of the stones.
+    `nodes` (..., 3) lie on the rock [m], in any frame; `diameter_m` sets the size of the mottles.
     """
     points = nodes.reshape(-1, 3)
     coarse = _noise_in_space(points, 0.3 * diameter_m, rng)

@@ -31,8 +31,7 @@ FACE_LIGHT_CELLS = 12
 def add_picture(spec: mujoco.MjSpec, name: str, pixels: NDArray[np.uint8], cube: bool) -> None:
     """Add a texture and a material of the same name that glows: the light is already in it.
 
-    Args:
-        pixels: (H, W, 3); for a cube, six squares stacked in the order of CUBE_FACES.
+    `pixels` is (H, W, 3); for a cube, six squares stacked in the order of CUBE_FACES.
     """
     kind = mujoco.mjtTexture.mjTEXTURE_CUBE if cube else mujoco.mjtTexture.mjTEXTURE_2D
     height, width = pixels.shape[:2]

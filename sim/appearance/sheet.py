@@ -86,10 +86,7 @@ def fixed_point(points: NDArray) -> NDArray[np.int32]:
 
 
 def faded(pixels: NDArray, contrast: float) -> NDArray:
-    """A picture (..., 3) of display values, its contrast around its mean colour times a share.
-
-    With a share of 1 it is the same picture; else it is float32.
-    """
+    """A picture (..., 3) with `contrast` times its contrast around its mean colour; as it is if 1."""
     if contrast == 1.0:
         return pixels
     mean = pixels.mean(axis=tuple(range(pixels.ndim - 1)), dtype=np.float64)
@@ -98,12 +95,9 @@ def faded(pixels: NDArray, contrast: float) -> NDArray:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def light_up(pixels: NDArray, light: NDArray, out: NDArray) -> None:
-    """Stretch a picture over `out`, multiply by the stretched light, round to bytes.
+    """Stretch a picture over `out` (R, C, 3) uint8, multiply by the stretched light, round.
 
-    Args:
-        pixels: (H, W, 3) float32 display values.
-        light: (h, w, 3) float32 factors of display values, coarse.
-        out: (R, C, 3) uint8 result, overwritten.
+    `pixels` (H, W, 3) and the coarse factors `light` (h, w, 3) are float32 display values.
     """
     rows, columns = out.shape[:2]
     # Rows of the two, stretched along x: the upper and the lower that a row of `out` is between.
@@ -128,13 +122,8 @@ def _multiply_rows(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _rows_around(y: float, image: NDArray, held: NDArray, stretched: NDArray) -> float:
-    """Have `stretched` hold the two rows around a relative height; returns the share of the lower.
-
-    Args:
-        y: Height in the picture, from 0 at the top to 1.
-        image: (H, W, 3) picture.
-        held: (2,) rows that `stretched` holds, kept up to date.
-        stretched: (2, 3 C) float64 two stretched rows.
+    """Have `stretched` (2, 3 C) hold the rows around height `y`, 0 (top) to 1; `held` (2,) lists them.
+    Returns the share of the lower row.
     """
     first, second, share = _between(y, image.shape[0])
     if held[1] == first:

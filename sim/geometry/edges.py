@@ -21,7 +21,7 @@ class Edges:
     """Every straight edge that may show from somewhere.
 
     Attributes:
-        ends: (E, 2, 3) float64 the ends of each, in `world` [m].
+        ends: (E, 2, 3) float64 ends of each edge, in `world` [m].
         faces: (E, 2) int64 the two triangles of each edge; the same twice if there is only one.
         creased: (E,) bool, whether an edge is visible when both triangles are.
         planes: (T, 4) float32 outward unit normal n of each triangle and the n @ x of its points.
@@ -46,10 +46,8 @@ class Edges:
 def find_edges(mesh: Mesh, ground: HeightField | None = None) -> Edges:
     """The edges of a closed world seen from outside its solids.
 
-    Args:
-        mesh: All visible triangles; vertices at the same place count as one.
-        ground: Natural ground into which the rest of the mesh is sunk, if any: the lines along
-            which it enters the ground are edges, too.
+    Vertices of `mesh` at the same place count as one. Lines along which it enters natural `ground`
+    are edges, too.
     """
     vertices, triangles = mesh
     corners = vertices[triangles]

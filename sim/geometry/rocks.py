@@ -36,12 +36,9 @@ _ROUNDNESS = 14  # exponent of the smooth minimum over planes: the higher, the s
 
 @dataclass(frozen=True, eq=False)
 class Rock:
-    """One rock.
+    """One rock with a unique name, `rock_000` and so on, and its mean width [m].
 
-    Attributes:
-        name: Unique, `rock_000` and so on.
-        diameter_m: Mean width of the rock [m].
-        vertices: (6, n, n, 3) nodes of the patches in `world` [m]; patches share their rims.
+    `vertices` (6, n, n, 3) are the patches' nodes in `world` [m]; patches share their rims.
     """
 
     name: str

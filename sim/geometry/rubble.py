@@ -98,11 +98,9 @@ def lane_points(scene: Scene, step_m: float = 0.03) -> NDArray[np.float64]:
 
 
 def distance_to_footprint(points: NDArray, corners: NDArray) -> float:
-    """Smallest horizontal distance [m] of points (N, 2) to a convex body's shadow; 0 inside.
+    """Smallest horizontal distance [m] of points (N, 2) to a convex body; 0 inside.
 
-    Args:
-        points: (N, 2) points [m].
-        corners: (C, 3) corners of the body [m]; their hull seen from above is its footprint.
+    The hull of its `corners` (C, 3) [m] seen from above is its footprint.
     """
     hull = cv2.convexHull(corners[:, :2].astype(np.float32))[:, 0].astype(np.float64)
     edges = np.roll(hull, -1, axis=0) - hull

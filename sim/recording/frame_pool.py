@@ -27,9 +27,7 @@ Task = tuple[Robot, int, int]
 def make_frames(plan: FramePlan, workers: int) -> Iterator[list[Written]]:
     """Write every frame; yields what was written, a few frames at a time, in any order.
 
-    Args:
-        plan: Images to make.
-        workers: Number of processes; with 1 the frames are made in this one.
+    With one worker the frames are made in this process.
 
     Raises:
         AirgroundError: A process died, as when memory runs out.
@@ -59,12 +57,8 @@ def make_frames(plan: FramePlan, workers: int) -> Iterator[list[Written]]:
 class FrameServer:
     """Gives a plan's frames as they are asked for, drawn a little ahead by other processes.
 
-    Asked in order, a robot's frames come without waiting if drawing keeps up; any other order
-    works too, each frame then drawn when it is asked for. A context manager.
-
-    Args:
-        plan: Images to make.
-        workers: Number of processes that draw.
+    A context manager. Asked in order, a robot's frames come without waiting if drawing keeps up;
+    in any other order each frame is drawn when it is asked for.
     """
 
     def __init__(self, plan: FramePlan, workers: int) -> None:

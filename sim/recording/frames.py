@@ -40,13 +40,9 @@ class FramePlan:
     """All that a process needs to make frames.
 
     Attributes:
-        recording: The folder that images are written into.
-        model: File of the compiled world with both cameras.
-        edges: File of its edges.
-        motion: File of both robots' motion.
+        recording: Folder that images are written into.
+        model, edges, motion: Files of the compiled world with both cameras, its edges, the motion.
         true: True calibration of the sensors.
-        preset: The faults of images and depth.
-        seeds: Seeds of the noise.
         stamps_ns: Nominal stamps of each robot's images [ns].
     """
 
@@ -70,10 +66,7 @@ class Written:
 
 
 class FrameMaker:
-    """Draws frames and puts their sensors' faults on them; writes them where asked.
-
-    A context manager, for the graphics context.
-    """
+    """Draws frames with their sensors' faults; a context manager, for the graphics context."""
 
     def __init__(self, plan: FramePlan) -> None:
         self._plan = plan

@@ -45,15 +45,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class Flight:
-    """What a recording is made from.
-
-    Attributes:
-        scene: The scene of the world.
-        seed: Decides the heap and, with `flight`, motion and noise.
-        flight: Number of the flight over the same heap.
-        sensors: Quality of the sensors.
-        duration_s: Cuts the flight short; the scene's own length if None.
-    """
+    """What a recording is made from; `record` explains the fields (`sensors` is its preset)."""
 
     scene: Scene
     seed: int
@@ -76,17 +68,14 @@ def record(
     """Record one flight over a scene; the same arguments give the same bytes.
 
     Args:
-        scene: The scene of the world.
+        scene: Scene of the world.
         seed: Decides the heap and, with `flight`, motion and noise.
         preset: Quality of the sensors.
-        out: The folder to make; it must not exist.
+        out: Folder to make; it must not exist. On any failure nothing is left behind.
         duration_s: Cuts the recording short; the scene's own length if None.
         workers: Number of processes that render; one per usable core if None.
-        flight: Another flight over the same heap.
+        flight: Number of the flight over the same heap.
         progress: Consumer of the rendering's progress.
-
-    Returns:
-        `out`. On any failure nothing is left behind.
 
     Raises:
         AirgroundError: One line on what was wrong.
@@ -129,10 +118,7 @@ def rendered(flight: Flight, workers: int) -> Iterator[Recording]:
     """The recording that `record` would make, message by message the same.
 
     Its folder, with samples and truth but without images, lasts as long as the context.
-
-    Args:
-        flight: Flight to simulate.
-        workers: Number of processes that draw; they stay a few frames ahead of the reader.
+    The workers' drawing stays a few frames ahead of the reader.
 
     Raises:
         AirgroundError: One line on what was wrong.
@@ -168,9 +154,7 @@ class _DrawnImages:
 def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan]:
     """Simulate a flight and write its samples, lists and truth into an empty folder.
 
-    Returns:
-        The header that is to be written last, and what the images are to be made from once
-        `_store_model` has stored the world.
+    Returns the header, to be written last, and the plan of the images, which needs `_store_model`.
     """
     scene, preset, seeds = flight.scene, flight.sensors, (flight.seed, flight.flight)
     motion_rng, calibration_rng, mav_rng, ground_rng = np.random.default_rng(seeds).spawn(4)

@@ -27,12 +27,9 @@ _MAX_DEVICES = 16
 
 
 class Renderer:
-    """Draws a world from named pinhole cameras, all in one graphics context.
+    """Draws a world (`model` from `with_cameras`) from named pinhole cameras, in one graphics context.
 
     A context manager; the context belongs to the thread that made it.
-
-    Args:
-        model: A world without joints, from `with_cameras`.
 
     Raises:
         AirgroundError: This machine cannot draw without a screen.
@@ -162,8 +159,7 @@ def _open_context(width: int, height: int) -> _EglContext | mujoco.GLContext:
 
 def with_cameras(spec: mujoco.MjSpec, cameras: Mapping[str, PinholeCamera]) -> mujoco.MjModel:
     """Compile a world (left as it is) with cameras of exact intrinsics, by name.
-
-    It is drawn with one sample a pixel, which lies in the pixel's centre.
+    It is drawn with one sample per pixel, at the pixel's centre.
     """
     spec = spec.copy()
     for name, camera in cameras.items():

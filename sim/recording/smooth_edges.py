@@ -29,7 +29,7 @@ def smooth_edges(
     T_world_camera: SE3,
     edges: Edges,
 ) -> NDArray[np.uint8]:
-    """A picture with one sample a pixel, as if it had very many.
+    """An antialiased copy of a picture that was drawn with one sample per pixel.
 
     Args:
         picture: (height, width, channels) picture at the pixels' centres.
@@ -37,9 +37,6 @@ def smooth_edges(
         camera: Intrinsics of the camera.
         T_world_camera: Pose of the camera.
         edges: Edges of all visible meshes.
-
-    Returns:
-        (height, width, channels), new.
     """
     T_camera_world = T_world_camera.inverse()
     eye = T_world_camera.translation
@@ -159,11 +156,8 @@ def _mix_along(line, picture, depth, smooth):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def share_beyond(distance, rise):  # type: ignore[no-untyped-def]
-    """How much of a pixel lies beyond a line.
-
-    Args:
-        distance: Distance from the pixel's centre to the line along the column [px], not negative.
-        rise: Rise of the line from one column to the next [px], 0 to 1.
+    """Share of a pixel beyond a line at `distance` >= 0 from its centre along the column [px].
+    The line rises by `rise` from one column to the next [px], 0 to 1.
     """
     whole_width = (1 - rise) / 2  # nearer lines leave the pixel at its sides
     if distance <= whole_width:

@@ -30,13 +30,7 @@ from sim.world.world import World
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """The true motion and calibration, by the recording's nominal stamps.
-
-    Attributes:
-        folder: Folder that it was read from.
-        motion: Both robots' exact states.
-        calibration: True calibration of the sensors.
-    """
+    """The true motion and calibration, by the recording's nominal stamps."""
 
     folder: Path
     motion: Motion
@@ -44,11 +38,7 @@ class Truth:
 
     @classmethod
     def open(cls, recording: Path | str) -> Truth:
-        """The truth of the recording in this folder.
-
-        Raises:
-            AirgroundError: It is not there or damaged.
-        """
+        """The truth of the recording in this folder; AirgroundError if missing or damaged."""
         folder = Path(recording) / TRUTH
         if not folder.is_dir():
             raise RecordingError(f"{folder}: this recording has no truth")
@@ -104,7 +94,6 @@ class Truth:
 
     def depth(self, robot: Robot, stamp_ns: int) -> NDArray[np.float32]:
         """(height, width) true depth [m] of the frame with this stamp, NaN for nothing.
-
         For the true intrinsics; z along the optical axis.
         """
         return self.cast(self.camera(robot), self.T_world_camera(robot, stamp_ns))
