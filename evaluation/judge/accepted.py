@@ -27,11 +27,8 @@ Text = Annotated[str, Field(min_length=1)]
 
 
 class Acceptance(Part):
-    """One decision, with the reason why the figures moved.
-
-    Attributes:
-        headline: The figure of every metric at that time; null where it was a failure.
-    """
+    """One decision and its reason; `headline` has every metric's figure then, null for a
+    failure."""
 
     date: date
     git_revision: str

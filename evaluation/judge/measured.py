@@ -17,14 +17,8 @@ from evaluation.table.rows import ResultTable
 
 @dataclass(frozen=True)
 class Measured:
-    """The watched metrics of one condition.
-
-    Attributes:
-        suite: Scenes, and number of flights over each.
-        condition: Condition of the measurement.
-        flights: All of them, sorted.
-        samples: By the metric's name, then by flight.
-    """
+    """The watched metrics of one condition, over a suite: scenes, and number of flights over each.
+    `flights` are sorted; `samples` are by the metric's name, then by flight."""
 
     suite: str
     condition: Condition

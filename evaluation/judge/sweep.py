@@ -26,13 +26,8 @@ SWEPT = {
 
 @dataclass(frozen=True)
 class Measured:
-    """One point of a sweep.
-
-    Attributes:
-        point: Values of the dials.
-        table: All rows measured there that do not depend on the machine.
-        readings: By the keys of `SWEPT`.
-    """
+    """One point of a sweep: values of the dials, all rows measured there that do not depend on the
+    machine, and the readings by the keys of `SWEPT`."""
 
     point: Point
     table: ResultTable

@@ -58,8 +58,7 @@ class Compared:
     Attributes:
         effect: Size, interval and chance of the change.
         count: Number of observations; of two samples, the smaller.
-        by_flight: Whether a flight is one observation. Else each of its trials is, taken as
-            independent, although trials of one flight are not quite.
+        by_flight: Whether a flight is one observation; else each trial is, taken as independent.
     """
 
     effect: Effect
@@ -72,13 +71,10 @@ class Judged:
     """One metric with its verdict.
 
     Attributes:
-        metric: The metric.
         before, after: Its figure on both sides; NaN where nothing was measured.
         compared: The change; None where nothing was measured.
-        p: Probability of the change by chance, adjusted for all metrics; NaN where nothing was
-            measured.
+        p: Probability of the change by chance, adjusted for all metrics; NaN where not measured.
         matters: The smallest effect that matters, in the metric's unit.
-        verdict: The verdict.
     """
 
     metric: Metric

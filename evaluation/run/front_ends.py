@@ -27,12 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class WatchedFrontEnds:
-    """The front ends of both robots, with a log of their answers.
-
-    Attributes:
-        mav, ground: Front end of each robot.
-        slam: Robots ("mav", "ground") whose front end is SLAM.
-    """
+    """The front ends of both robots, with a log of their answers; `slam`: robots with SLAM."""
 
     mav: WatchedFrontEnd[MavImage]
     ground: WatchedFrontEnd[GroundImage]
@@ -60,14 +55,9 @@ class WatchedFrontEnds:
 def front_ends_for(
     setup: Setup, recording: Pair, truth: Truth | None, rng: np.random.Generator
 ) -> WatchedFrontEnds:
-    """The front ends of a setup, for each robot.
-
-    Args:
-        setup: Choice of the front ends.
-        recording: Source of the nominal calibrations.
-        truth: Source of the oracles' poses; None where the setup has no oracle.
-        rng: Source of the oracles' errors and SLAM's samples.
-    """
+    """The front ends of a setup, for each robot, with the nominal calibrations of the recording.
+    `truth` may be None where the setup has no oracle; `rng` gives the oracles' errors and SLAM's
+    samples."""
     way, given = setup.front_ends(), setup.given
     oracles = _oracles(setup, recording, truth, rng)
     mav_rng, ground_rng = rng.spawn(2)

@@ -130,13 +130,8 @@ def print_alone(summary: dict[str, Any]) -> None:
 
 @dataclass(eq=False)
 class PairEvents:
-    """An onlooker that keeps what a run without truth reports.
-
-    Attributes:
-        surfaces: Number of aerial surfaces.
-        located: Number of aerial surfaces after which a position was claimed.
-        alignments: Every refinement, in order of time.
-    """
+    """An onlooker that keeps what a run without truth reports: the numbers of aerial surfaces and
+    of those after which a position was claimed, and every refinement in order of time."""
 
     surfaces: int = 0
     located: int = 0
@@ -155,13 +150,8 @@ class PairEvents:
 
 @dataclass(frozen=True, eq=False)
 class PairResult:
-    """What a run over two recordings leaves.
-
-    Attributes:
-        tracked: Answers of the front ends, by robot ("mav", "ground").
-        augmented: The augmented map.
-        events: Surfaces, claims and alignments.
-    """
+    """What a run over two recordings leaves; `tracked` has the answers by robot ("mav",
+    "ground")."""
 
     tracked: dict[str, Tracked]
     augmented: AugmentedMap
@@ -172,12 +162,6 @@ def run_pair(pair: Pair, setup: Setup, seed: int, onlookers: Sequence[Onlooker] 
     """Run the pipeline of Figure 4 from the first message to the last.
 
     A recording of ours that was exported and is read as a pair gives the same result as itself.
-
-    Args:
-        pair: Measurements of both robots.
-        setup: Settings of the pipeline.
-        seed: Seed of all random numbers.
-        onlookers: Consumers of every event.
 
     Raises:
         InputError: The setup takes the heading from magnetometers, and a robot has none.

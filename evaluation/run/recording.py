@@ -93,16 +93,7 @@ def measure(path: Path | str, config: Config | None = None, seed: int = 0) -> Ru
 
 
 class RunRows:
-    """An onlooker that turns the events of a run into rows.
-
-    Args:
-        recording: Measurements of both robots.
-        truth: Reference of all errors.
-        setup: Settings of the pipeline.
-
-    Attributes:
-        out: The rows.
-    """
+    """An onlooker that turns the events of a run into rows, in `out`."""
 
     def __init__(self, recording: Recording, truth: Truth, setup: Setup) -> None:
         condition = setup.condition(recording.sensors)

@@ -38,14 +38,7 @@ Order = TypeVar("Order")
 
 @dataclass(frozen=True)
 class RobotTask:
-    """One robot's tracking, as sent to its process.
-
-    Attributes:
-        recording: Folder of the recording.
-        robot: The robot whose images are tracked.
-        setup: Choice of the front end.
-        seed: Seed of the front ends.
-    """
+    """One robot's tracking, as sent to its process; the setup chooses the front end."""
 
     recording: Path
     robot: Source
@@ -103,14 +96,8 @@ class RobotProcess(AbstractContextManager["RobotProcess"]):
         self._pipe.send(order)
 
     def receive(self, or_none: bool = False) -> Any:
-        """The next answer.
-
-        Args:
-            or_none: Whether a process that died gives None instead of an error.
-
-        Raises:
-            AirgroundError: The process could not go on, or died.
-        """
+        """The next answer; None with `or_none` if the process died. Raises AirgroundError if the
+        process could not go on, or died."""
         try:
             answer = self._pipe.recv()
         except (EOFError, OSError):
@@ -147,9 +134,7 @@ def open_tracker(
 ) -> tuple[Recording, WatchedFrontEnds, RobotTracker]:
     """The recording, the front ends and one robot's tracker, compiled, in the robot's process.
 
-    Args:
-        task: The robot's task.
-        niceness: Niceness added to that of the process.
+    `niceness` is added to that of the process.
 
     Raises:
         AirgroundError: The recording or its truth is missing or damaged.

@@ -123,13 +123,8 @@ def front_end_rng(seed: int) -> np.random.Generator:
 
 def localizer_rng(seed: int, flight: int, sequence: int = 0) -> np.random.Generator:
     """Source of the particles' random numbers.
-
-    Args:
-        seed: Seed of the run.
-        flight: Number of the flight over its scene.
-        sequence: 0 for the pipeline's own localization, from 1 on for sequences that repeat the
-            pipeline's sightings from a later start.
-    """
+    `sequence` is 0 for the pipeline's own localization, and from 1 on for sequences that repeat the
+    pipeline's sightings from a later start."""
     return np.random.default_rng([seed, flight, 1, sequence])
 
 

@@ -36,13 +36,7 @@ PIXEL_BYTES = {Source.MAV: 1, Source.GROUND: 3 + 4}
 
 @dataclass(frozen=True)
 class _Handed:
-    """A frame without its pixels.
-
-    Attributes:
-        slot: Number of the slot that holds the pixels.
-        shapes: Shape of the image, or of colour and depth.
-        stamp_ns, pose, north_rad, trajectory: As in `TrackedFrame`.
-    """
+    """A frame without its pixels, which lie in a slot: of an image, or of colour and depth."""
 
     slot: int
     shapes: tuple[tuple[int, ...], ...]
@@ -126,13 +120,8 @@ class _Order:
 
 
 class TrackingApart(AbstractContextManager["TrackingApart"]):
-    """Tracks each robot in a process that ends with the block (see `RobotProcess`).
-
-    It gives the same frames and the same report as `TrackingHere`.
-
-    Args:
-        task: Recording, front ends, seed and drops; the recording must lie on disk.
-    """
+    """Tracks each robot in a process that ends with the block (see `RobotProcess`), with the same
+    frames and report as `TrackingHere`. The recording must lie on disk."""
 
     def __init__(self, task: TrackingTask) -> None:
         self._task = task
@@ -163,7 +152,6 @@ class TrackingApart(AbstractContextManager["TrackingApart"]):
         self._stack.close()
 
     def wait_until_ready(self) -> None:
-        """As `Tracking.wait_until_ready`."""
         for process in self._processes.values():
             process.wait_until_ready()
 

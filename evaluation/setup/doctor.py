@@ -72,14 +72,7 @@ class Health(Enum):
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at.
-
-    Attributes:
-        what: Its name.
-        health: How it is.
-        detail: What was found.
-        remedy: What to do; empty when fine.
-    """
+    """One thing that was looked at, what was found, and what to do about it; empty when fine."""
 
     what: str
     health: Health

@@ -44,14 +44,11 @@ def files_mib() -> float:
 
 
 class AddedMemory:
-    """What a block adds to the resident memory of this process at its peak.
+    """What a block adds to the resident memory of this process at its peak, in `mib` [MiB].
 
     Arrays of NumPy, of compiled kernels and of Open3D all count; pages that were allocated and
     never touched do not. Memory that the allocator kept of earlier work is handed back first:
-    the block could use it unseen.
-
-    Attributes:
-        mib: After the block [MiB]; None where the system does not count it.
+    the block could use it unseen. `mib` is None where the system does not count it.
     """
 
     mib: float | None = None

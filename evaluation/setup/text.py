@@ -21,12 +21,8 @@ FINE_M = 0.1
 
 @dataclass(frozen=True)
 class TextTable:
-    """Cells as text; the first column names the row.
-
-    Attributes:
-        header: One text per column.
-        rows: Tuples as long as the header; what follows a line break in a cell is detail.
-    """
+    """Cells as text, in rows as long as the header; the first column names the row. What follows a
+    line break in a cell is detail."""
 
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]

@@ -132,12 +132,7 @@ class FrontEndLog:
 
 
 class WatchedFrontEnd(FrontEndLog, Generic[Image]):
-    """Passes everything on, and keeps the answers and their times.
-
-    Args:
-        inner: The front end that tracks.
-        clock: Gives the time [s].
-    """
+    """Passes everything on to `inner`, and keeps the answers and their times by `clock` [s]."""
 
     def __init__(
         self, inner: FrontEnd[Image], clock: Callable[[], float] = time.perf_counter
@@ -173,14 +168,8 @@ class WatchedFrontEnd(FrontEndLog, Generic[Image]):
 
 @dataclass(frozen=True, eq=False)
 class Tracked:
-    """A front end's result over a recording.
-
-    Attributes:
-        robot: "mav" or "ground".
-        front_end: Its answers, image by image.
-        final: Its poses after the last image.
-        slam: Whether it was SLAM, so that its times are worth keeping.
-    """
+    """A front end's result over a recording: answers image by image, and final poses.
+    `slam` is whether it was SLAM, so that its times are worth keeping."""
 
     robot: str
     front_end: FrontEndLog

@@ -37,12 +37,8 @@ class Matches:
 
 @dataclass(frozen=True, eq=False)
 class Located:
-    """A camera pose and the matches that agree with it.
-
-    Attributes:
-        T_ground_camera: Pose of the MAV's camera, None if too few matches agree.
-        inliers: (N,) whether each match agrees, in the order of the views.
-    """
+    """A camera pose, None if too few matches agree, and (N,) `inliers`: whether each match agrees,
+    in the order of the views."""
 
     T_ground_camera: SE3 | None
     inliers: NDArray[np.bool_]

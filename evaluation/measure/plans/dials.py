@@ -29,14 +29,13 @@ class Subject:
 
 @dataclass(frozen=True)
 class Dial:
-    """A number that a sweep can vary.
+    """A number that a sweep can vary, by its name in `--vary`.
 
     Attributes:
-        name: As `--vary` knows it.
-        unit: Of its values; empty for a share or a factor.
-        low, high: The range of its values.
-        does: What it changes, in words.
-        turn: The subject with the dial at a value.
+        unit: Unit of its values; empty for a share or a factor.
+        low, high: Range of its values.
+        does: Its effect, in words.
+        turn: Function that sets the dial to a value in a subject.
     """
 
     name: str

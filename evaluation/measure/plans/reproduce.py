@@ -84,12 +84,8 @@ class Plan:
         return replace(flight, scene=others[0]) if others else None
 
     def units(self, flight: Flight, recordings: Mapping[str, Path] = NOTHING) -> list[Unit]:
-        """The units of one flight, that of the primary setup first.
-
-        Args:
-            flight: The flight.
-            recordings: Recordings by their `recording_name`; images of others are drawn.
-        """
+        """The units of one flight, that of the primary setup first; `recordings` are by their
+        `recording_name`, and images of others are drawn."""
 
         def where(of: Flight) -> Path | Flight:
             return recordings.get(recording_name(of), of)

@@ -22,13 +22,7 @@ SEEDS_APART = 100
 
 @dataclass(frozen=True)
 class Flights:
-    """Some flights over one scene, each over a heap of its own.
-
-    Attributes:
-        scene: Name of the scene.
-        count: Number of flights.
-        duration_s: Duration of each recording, where the flight is cut [s].
-    """
+    """Some flights over one scene, each over a heap of its own and cut after `duration_s`."""
 
     scene: str
     count: int
@@ -43,13 +37,8 @@ class Suite:
     protocol: Protocol
 
     def plan(self, setup: Setup, sensors: SensorPreset, seed: int) -> Plan:
-        """The plan that measures one setup.
-
-        Args:
-            setup: The setup.
-            sensors: Quality of the sensors.
-            seed: Seed of the heaps, the flights, the noise and the particles.
-        """
+        """The plan that measures one setup; `seed` is that of heaps, flights, noise and
+        particles."""
         flights = [
             Flight(
                 load_scene(flights.scene),

@@ -23,14 +23,13 @@ class SweepPlan:
     """What to sweep.
 
     Attributes:
-        varied: The dials and their values.
-        scenes: Which worlds.
-        flights: How many flights over each, every one over a heap of its own.
-        setup: What is measured, with the dials where they are not turned.
-        sensors: The same of the sensors.
-        protocol: How much is measured on each flight.
-        seed: Of the first flight; the next ones have the next seeds.
-        duration_s: Cuts flights short; the scene's own length if None.
+        varied: Dials and their values.
+        scenes: Scenes to fly over.
+        flights: Number of flights over each scene, each over a heap of its own.
+        setup, sensors: Setup and sensors before the dials are turned.
+        protocol: Extent of the measurements on each flight.
+        seed: Seed of the first flight; the next ones have the next seeds.
+        duration_s: Duration at which flights are cut [s]; None for that of the scene.
     """
 
     varied: tuple[Vary, ...]

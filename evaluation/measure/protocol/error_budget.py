@@ -99,15 +99,11 @@ def add_error_budget(
     maps: Maps,
     seed: tuple[int, int],
 ) -> None:
-    """Write the final error of every sighting under every stand-in.
+    """Write the final error of every sighting under every stand-in, whose name is the rows' note.
 
-    Args:
-        out: Receives rows of the stage "budget"; their note is the stand-in's name.
-        recording: Recording, mapped again for each source of poses.
-        truth: Source of the true quantities.
-        setup: Setup with poses from SLAM.
-        maps: Outcome of the pass under `setup`.
-        seed: Seed of the recording and number of the flight; stand-ins share random numbers.
+    `maps` is the pass under `setup`, which has poses from SLAM; `recording` is mapped again for
+    each other source of poses. `seed` has the seed of the recording and the number of the flight;
+    stand-ins share random numbers.
     """
     mapped: dict[str, Maps] = {setup.poses: maps}
     for stand_in in STAND_INS:

@@ -127,14 +127,8 @@ def map_recording(
     onlookers: Sequence[Onlooker] = (),
 ) -> Maps:
     """Run the pipeline of Figure 4 over a whole recording, each frame tracked in turn.
-
-    Args:
-        recording: Measurements of both robots.
-        truth: Source of the oracles' poses.
-        setup: Settings of the pipeline.
-        seed, flight: Seed of the recording and number of its flight; they seed the pipeline.
-        onlookers: Further consumers of every event.
-    """
+    The pipeline is seeded by the recording's `seed` and the number of its `flight`; `truth` gives
+    the oracles their poses; `onlookers` see every event."""
     maps = Maps()
     tracking = TrackingHere(TrackingTask(recording, truth, setup, seed), ahead=0)
     pipeline = pipeline_for(recording, setup, localizer_rng(seed, flight))
@@ -159,23 +153,14 @@ def localize_again(
 
 @dataclass(frozen=True, eq=False)
 class GroundPass:
-    """Map of a ground robot alone.
-
-    Attributes:
-        cloud_ground: Its final map.
-        T_ground_camera: Its last camera pose.
-    """
+    """Map of a ground robot alone: its final cloud, and its last camera pose."""
 
     cloud_ground: PointCloud
     T_ground_camera: SE3
 
 
 def map_ground(recording: Recording, truth: Truth, setup: Setup, seed: int) -> GroundPass | None:
-    """Run the pipeline over a recording without the MAV's images.
-
-    Returns:
-        The ground robot's map; None if the robot never had a pose.
-    """
+    """A ground robot's map without the MAV's images; None if the robot never had a pose."""
     no_aerial = DropList(
         schema=SCHEMA,
         recording=fingerprint(recording),

@@ -44,14 +44,9 @@ def add_negatives(
 ) -> None:
     """Write the results of localization and refinement in the negative cases.
 
-    Args:
-        out: Receives rows of the cases' stages.
-        maps: Outcome of the pass; its sightings are those of the positive sequences and trials.
-        stranger: A ground robot's map of another scene; None leaves `WRONG_MAP` out.
-        truth: Reference of the errors, and of the overlap to remove.
-        config: Configuration of localization and refinement.
-        seed: Seed of the recording and number of the flight.
-        protocol: Numbers of sequences and trials in each case.
+    The sightings are those of the positive sequences and trials, of `maps`. `stranger` is a ground
+    robot's map of another scene; None leaves `WRONG_MAP` out. `seed` has the seed of the recording
+    and the number of the flight.
     """
     sightings = [without_overlap(sighting, truth) for sighting in maps.sightings]
     _add_case(out, NO_OVERLAP, sightings, truth, config, seed, protocol)

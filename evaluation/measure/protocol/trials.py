@@ -54,14 +54,8 @@ class Protocol:
 
 @dataclass(frozen=True)
 class Iteration:
-    """One update of a sequence's filter with an aerial map.
-
-    Attributes:
-        belief: Belief after the update.
-        error: Its error against the truth.
-        squared_mahalanobis: The error in the measure of the belief's covariance
-            (`evaluation.judge.claims`).
-    """
+    """One update of a sequence's filter with an aerial map: the belief, its error, and the error in
+    the measure of the belief's covariance (`evaluation.judge.claims`)."""
 
     belief: Belief
     error: PoseError

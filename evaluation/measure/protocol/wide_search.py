@@ -40,15 +40,8 @@ def add_wide_searches(
     count: int,
 ) -> None:
     """Localize single aerial maps, each with a new filter, and write the results.
-
-    Args:
-        out: Receives the rows.
-        sightings: Sightings of one flight.
-        truth: Reference of the errors.
-        config: Configuration of the pipeline.
-        seed: Seed of the recording and number of the flight.
-        count: Number of aerial maps, spread evenly over the flight.
-    """
+    `seed` has the seed of the recording and the number of the flight; `count` aerial maps are
+    spread evenly over the flight."""
     radius_m = WIDER * config.localization.search_radius_m
     widened = with_localization(config, search_radius_m=radius_m)
     for trial in spread_evenly(len(sightings), count):
@@ -65,14 +58,8 @@ def add_wide_searches(
 
 
 def lead_of(cost_map: CostMap, place: NDArray) -> float:
-    """Lowest cost elsewhere minus the lowest at the true place, in units of the cost.
-
-    Positive if the true place has the lowest cost. A place without a cost counts as `WORST`.
-
-    Args:
-        cost_map: Cost map of one aerial map.
-        place: (2,) true position u [m].
-    """
+    """Lowest cost elsewhere minus the lowest at the true place (2,) [m], in units of the cost.
+    Positive if the true place has the lowest cost. A place without a cost counts as `WORST`."""
     cells = np.indices(cost_map.costs.shape) / cost_map.cells_per_m
     away = np.hypot(*(cells + (cost_map.origin - place)[:, None, None]))
     costs = np.nan_to_num(cost_map.costs, nan=WORST)

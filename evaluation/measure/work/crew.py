@@ -85,11 +85,7 @@ class Crew:
     ) -> Iterator[tuple[int, Outcome]]:
         """Index and outcome of each task, in the order in which they finish.
 
-        The task of a worker that dies is repeated by another.
-
-        Args:
-            function: Function of a task; of a module, since other processes import it.
-            tasks: The tasks.
+        The task of a worker that dies is repeated by another. Other processes import `function`.
 
         Raises:
             InputError: The cluster cannot be reached or used.

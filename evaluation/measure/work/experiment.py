@@ -51,12 +51,8 @@ REPEATED = "the pipeline's sightings, repeated from a later start"
 
 
 def measure_units(units: Sequence[Unit], renderers: int) -> list[Finished]:
-    """Measure units that share their maps.
-
-    Args:
-        units: Setups on one flight; extras are those of the first.
-        renderers: Number of processes that render images on the fly.
-    """
+    """Measure units that share their maps, with extras of the first only; `renderers` processes
+    render images on the fly."""
     first = units[0]
     stranger = None
     if first.stranger is not None:

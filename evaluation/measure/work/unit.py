@@ -134,12 +134,7 @@ _PARTIAL = ".partial-"
 
 @dataclass(frozen=True)
 class Finished:
-    """Results of one unit, or of several.
-
-    Attributes:
-        table: The rows.
-        showcase: Data of the pictures; None without.
-    """
+    """Rows of one unit, or of several, and the data of the pictures; None without pictures."""
 
     table: ResultTable
     showcase: Showcase | None = None

@@ -85,12 +85,7 @@ def in_order(
 
     A frame waits for the other robot's next frame, which may be older. After `patience_s` without
     it, the other robot counts as silent and no frame waits for it until it sends again; its frames
-    that are older than the newest frame taken are late.
-
-    Args:
-        streams: Messages of each robot.
-        clock: Clock by which messages cross the radio.
-        patience_s: Longest wait for one robot [s].
+    that are older than the newest frame taken are late. Messages cross the radio by `clock`.
     """
     newest = (-1, Source.GROUND)
     silent: set[Source] = set()

@@ -51,11 +51,9 @@ class PlaybackClock:
     rate: float
 
     def now_ns(self) -> int:
-        """As `Clock.now_ns`."""
         return self.first_ns + round((time.monotonic_ns() - self.started_ns) * self.rate)
 
     def wait_until(self, stamp_ns: int) -> None:
-        """As `Clock.wait_until`."""
         due_ns = self.started_ns + (stamp_ns - self.first_ns) / self.rate
         seconds = (due_ns - time.monotonic_ns()) * 1e-9
         if seconds > 0:
@@ -162,15 +160,8 @@ def play(
     """Track one robot's images as they arrive by the clock.
 
     A file is decoded before its image is due wherever there is time, since a camera delivers
-    pixels. The inertial samples before a dropped image are tracked with the next image.
-
-    Args:
-        recording: Recording of both robots.
-        robot: The robot to play.
-        tracker: Tracker of that robot.
-        clock: Clock of the playback.
-        capacity: Number of images that may wait.
-        hand_over: Receives each frame that has its pose; must not block.
+    pixels. The inertial samples before a dropped image are tracked with the next image. `capacity`
+    images may wait. `hand_over` receives each frame that has its pose; it must not block.
     """
     own = recording.of(robot)
     stamps_ns = own.camera_stamps.tolist()

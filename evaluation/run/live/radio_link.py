@@ -42,15 +42,8 @@ class RadioLimits:
 
 
 class Radio:
-    """Carries one message after the other.
-
-    Args:
-        limits: Limits of the link.
-        rng: Source of the random losses.
-
-    Attributes:
-        carried_bytes: Size of all messages sent, lost ones included.
-    """
+    """Carries one message after the other; `carried_bytes` counts all messages sent, lost ones
+    too."""
 
     def __init__(self, limits: RadioLimits, rng: np.random.Generator) -> None:
         self._limits, self._rng = limits, rng
