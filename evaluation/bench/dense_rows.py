@@ -81,7 +81,6 @@ class Sweep:
         self._added += 1
 
     def complete(self) -> PlaneSweep:
-        """The sweep with all its views."""
         self.begin()
         for _ in self.views:
             self.add_next()
@@ -90,7 +89,6 @@ class Sweep:
 
 
 def sweep_of(material: Material, config: Config) -> Sweep:
-    """The sweep for the depth map in the middle of the surface."""
     return Sweep(material.mav_camera, material.reference, material.views, config)
 
 
@@ -142,7 +140,6 @@ class VoxelWork:
         self._histogram.add(self.depth_maps[self._histogram.depth_maps % len(self.depth_maps)])
 
     def add_all(self) -> None:
-        """The distance fields of all depth maps."""
         self._histogram = self._empty(self._volume())
         for depth_map in self.depth_maps:
             self._histogram.add(depth_map)
@@ -164,7 +161,6 @@ class VoxelWork:
         return surface_cloud(volume, depth, normals, self.reference)
 
     def all_of_it(self) -> PointCloud:
-        """From depth maps to points."""
         self.add_all()
         return self.cast(self.fuse())
 

@@ -90,7 +90,6 @@ class Lane:
         return added.mib
 
     def clear(self) -> None:
-        """Forget what was made."""
         self._made.clear()
 
     def _work(self, contender: Contender | CurvePoint) -> Work:
@@ -118,7 +117,6 @@ class LaneProcess:
         self._pool = ProcessPoolExecutor(1, context, prepare_worker, (threads,))
 
     def open(self, path: Path, whole: bool) -> Opened:
-        """Probe the cores and play the recording."""
         return self.ask(_open, path, whole)
 
     def live(self, path: Path) -> LiveSummary:
@@ -188,7 +186,6 @@ def _on_lane(method: Callable[Concatenate[Lane, P], T], *args: P.args, **kwargs:
 
 
 def _play_live(path: Path) -> LiveSummary:
-    """Play a recording with its truth at its own rate, as a live run does."""
     recording = Recording.open(path)
     result, _ = run_live(recording, Truth.open(path), Setup(Config()), 0, Playback())
     summary = live_summary(result.table)

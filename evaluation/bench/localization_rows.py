@@ -58,7 +58,6 @@ class Maps:
 
     @property
     def _offsets(self) -> int:
-        """Offsets searched along one side."""
         side = 2 * self.config.localization.search_radius_m * self.aerial.cells_per_m
         return math.floor(side + 1e-6) + 1
 

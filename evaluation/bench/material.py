@@ -52,9 +52,6 @@ class Material:
     """One aerial surface and the input of every stage for it.
 
     Attributes:
-        recording: The recording that it comes from.
-        config: The parameters that it was made with.
-        mav_camera, ground_camera: Intrinsics of the images.
         depth_maps: The depth maps that were fused.
         reference: The view of the middle depth map.
         views: The views that were compared with the reference, in order of time.

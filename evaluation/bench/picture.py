@@ -168,7 +168,6 @@ def _draw_curve(axes: Axes, curve: CurveResult) -> None:
 
 
 def cores(threads: int) -> str:
-    """A number of cores in words."""
     return "1 core" if threads == 1 else f"{threads} cores"
 
 

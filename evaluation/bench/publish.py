@@ -72,7 +72,6 @@ def with_table(page: str, report: BenchReport) -> str:
 
 
 def header(report: BenchReport) -> list[str]:
-    """Titles of the columns."""
     lanes = [cores(speed.threads) for speed in report.machine.speeds]
     return ["stage [ms]", *lanes, "CPU", "paper", "target", "floor", "peer", "memory"]
 

@@ -91,7 +91,6 @@ class RowResult(Part):
 
     @property
     def best(self) -> LaneTiming:
-        """With all cores."""
         return self.lanes[-1]
 
 
@@ -122,8 +121,6 @@ class Machine(Part):
 
 
 class RecordingInfo(Part):
-    """The recording that was worked on."""
-
     scene: str
     seed: int
     sensors: str
@@ -131,8 +128,6 @@ class RecordingInfo(Part):
 
 
 class CurvePointTiming(Part):
-    """A curve at one value."""
-
     value: float
     timing: Timing
 

@@ -81,10 +81,8 @@ def _write_states(path: Path, simulated: Simulated) -> None:
 
 
 def _biases(simulated: Simulated) -> NDArray[np.float64]:
-    """(N, 6) biases of gyro [rad/s] and accelerometer [m/s^2].
-    A recording does not hold the biases that its simulator drew. These are estimates, as EuRoC's
-    are, but from the truth: white noise remains with its density over sqrt(2 sqrt(pi)
-    BIAS_WINDOW_S)."""
+    """(N, 6) biases of gyro [rad/s] and accelerometer [m/s^2] from the truth: recordings hold none.
+    White noise remains with its density over sqrt(2 sqrt(pi) BIAS_WINDOW_S)."""
     samples, _ = simulated.samples("mav")
     motion = simulated.motion("mav")
     measured = np.hstack([samples.gyro, samples.accelerometer])

@@ -32,7 +32,6 @@ class World(Part):
 
     @property
     def folder(self) -> str:
-        """Its folder in the dataset."""
         return f"{self.part}/{self.name}_s{self.seed}"
 
 

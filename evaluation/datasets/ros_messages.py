@@ -27,7 +27,6 @@ def make(kind: str, **fields: Any) -> Any:
 
 
 def header(stamp_ns: int, frame: str) -> Any:
-    """Stamp and frame of a message."""
     seconds, nanoseconds = divmod(stamp_ns, SECOND_NS)
     stamp = make("builtin_interfaces/msg/Time", sec=seconds, nanosec=nanoseconds)
     return make("std_msgs/msg/Header", stamp=stamp, frame_id=frame)
@@ -129,7 +128,6 @@ def transforms(stamp_ns: int, edges: list[tuple[str, str, SE3]]) -> Any:
 
 
 def pose(stamp_ns: int, frame: str, T_frame_child: SE3) -> Any:
-    """A stamped pose."""
     return make(
         "geometry_msgs/msg/PoseStamped", header=header(stamp_ns, frame), pose=_pose(T_frame_child)
     )

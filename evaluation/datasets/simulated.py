@@ -47,7 +47,6 @@ class Simulated:
         return cls(recording, Truth.open(path), recording.images)
 
     def sensed(self, robot: Robot) -> RobotRecording[Any]:
-        """One robot's part of the recording."""
         return self.recording.mav if robot == "mav" else self.recording.ground
 
     def nominal(self, robot: Robot) -> RobotTable:
@@ -56,7 +55,6 @@ class Simulated:
         return calibration.mav if robot == "mav" else calibration.ground
 
     def motion(self, robot: Robot) -> RobotMotion:
-        """The robot's true motion."""
         return self.truth.motion.robot(robot)
 
     def stamps_ns(self, robot: Robot) -> list[int]:

@@ -32,7 +32,6 @@ class Finding:
 
 
 def show(title: str, findings: Sequence[Finding]) -> None:
-    """Print findings as a table."""
     colours = {Verdict.FINE: "", Verdict.NOTED: "yellow", Verdict.WRONG: "bold red"}
     rows = tuple((one.part, one.subject, one.found, str(one.verdict)) for one in findings)
     styles = [colours[one.verdict] for one in findings]
@@ -41,7 +40,6 @@ def show(title: str, findings: Sequence[Finding]) -> None:
 
 
 def as_json(dataset: str, layout: str, findings: Sequence[Finding]) -> str:
-    """Findings as JSON."""
     content = {
         "schema": "airground-inspection",
         "version": 1,

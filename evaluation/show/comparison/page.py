@@ -36,7 +36,6 @@ def write_comparison(out: Path, helds: Sequence[Against]) -> None:
 
 
 def _section(held: Against) -> dict[str, object]:
-    """What the page states of one run, beside the figures."""
     return {
         "name": held.run.name,
         "outcome": held.outcome(),
@@ -74,13 +73,7 @@ def overview_table(helds: Sequence[Against]) -> TextTable:
 
 @dataclass(frozen=True)
 class FailuresMoved:
-    """Failures of a run beside those of the reference, over the same flights.
-
-    Attributes:
-        appeared: Failures of the run only.
-        went: Failures of the reference only.
-        stayed: Number of failures of both.
-    """
+    """Failures over the same flights: of the run only, of the reference only, number in both."""
 
     appeared: list[Failure]
     went: list[Failure]

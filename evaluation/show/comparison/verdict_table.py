@@ -74,7 +74,6 @@ def conditions(comparison: Comparison) -> str:
 
 
 def print_comparison(comparison: Comparison, console: Console | None = None) -> None:
-    """The table on the screen."""
     console = console or Console()
     kept = [n for n, name in enumerate(HEADER) if console.width >= WIDE or name in NARROW]
     header, *rows = (

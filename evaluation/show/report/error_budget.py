@@ -68,7 +68,6 @@ def budget_figure(table: ResultTable, condition: Condition) -> Iterator[ReportFi
 
 
 def budget_table(table: ResultTable) -> TextTable:
-    """One row a stand-in."""
     rows = []
     for name, (position, angle) in _errors(table).items():
         good = is_good_pose(position, angle)

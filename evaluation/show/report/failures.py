@@ -15,12 +15,11 @@ from evaluation.table.rows import SEQUENCE_KEYS, ResultTable
 
 @dataclass(frozen=True)
 class Failure:
-    """One sequence that did not find its place, or one refinement that did not end there.
+    """A sequence that did not find its place, or a refinement that did not end there.
 
     Attributes:
         kind: "sequence" or "refinement".
         place: Scene, seed, flight, and number of the sequence or trial.
-        result: How it ended.
         said: What the pipeline reported: a claim, or the reason of a refusal.
         story: The errors step by step.
     """

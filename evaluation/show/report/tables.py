@@ -35,14 +35,8 @@ SEQUENCES, TRIALS = f"{published.SEQUENCES.value:g}", f"{published.REFINEMENT_TR
 
 @dataclass(frozen=True)
 class Headline:
-    """One of the numbers that a reader looks for first.
-
-    Attributes:
-        title: What was measured.
-        value: The number here.
-        detail: Number of cases and confidence interval.
-        paper: The paper's value.
-    """
+    """One of the numbers that a reader looks for first: its value here with number of cases and
+    interval, and the paper's."""
 
     title: str
     value: str

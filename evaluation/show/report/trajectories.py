@@ -19,12 +19,7 @@ RUN_KEYS = ["scene", "seed", "flight"]
 
 
 def trajectory_figures(table: ResultTable, condition: Condition) -> Iterator[ReportFigure]:
-    """Fig. 9 and 10 of one condition: the median run and the worst.
-
-    Args:
-        table: Rows of that condition, control scenes apart.
-        condition: For the captions.
-    """
+    """Fig. 9 and 10 of one condition: the median run and the worst, without control scenes."""
     for number, robot, paper in (
         (9, "mav", published.MAV_RMSE_M),
         (10, "ground", published.GROUND_RMSE_M),

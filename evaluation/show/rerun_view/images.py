@@ -72,7 +72,6 @@ class Images:
             stream.log_always(image, lens)
 
     def see(self, seen: Seen) -> None:
-        """Draw an image, tracked or not."""
         frame = seen.frame
         if isinstance(seen.event, IMAGE_EVENTS) and self._pace[frame.robot].due(frame.stamp_ns):
             entity = f"{ROBOT[frame.robot]}/camera/image"
@@ -132,7 +131,6 @@ class DepthMaps:
         self._pace = Pace(level.depth_map_hz)
 
     def see(self, seen: Seen) -> None:
-        """Draw a depth map."""
         match seen.event:
             case DepthMapMade(stamp_ns=stamp_ns, depth_map=made) if self._pace.due(stamp_ns):
                 self._stream.log(stamp_ns, "mav/depth_map", _encoded_depth(made.depth))

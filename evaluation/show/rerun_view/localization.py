@@ -41,7 +41,6 @@ class Localization:
             stream.put_in_frame(COSTS, TRUE_POSITION)
 
     def see(self, seen: Seen) -> None:
-        """Draw the input of localization, and its result."""
         stamp_ns = seen.event.stamp_ns
         match seen.event:
             case HeightMapsMade():
@@ -58,8 +57,8 @@ class Localization:
                 self._draw_truth(stamp_ns, seen, self._cost_map)
 
     def _draw_heights(self, stamp_ns: int, cost_map: CostMap) -> None:
-        """The aerial map around its camera, the ground map where there are costs.
-        The viewer treats the pictures of an entity as a video: all have one size."""
+        """The aerial map around its camera, the ground map where there are costs; all pictures of
+        an entity have one size, because the viewer treats them as a video."""
         assert self._heights is not None
         aerial, ground = self._heights.aerial, self._heights.ground
         if self._aerial_cells is None:

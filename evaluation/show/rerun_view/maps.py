@@ -46,7 +46,6 @@ class Maps:
         stream.put_in_frame(SURFACE, "mav/surface")
 
     def see(self, seen: Seen) -> None:
-        """Draw a change of a map."""
         stamp_ns = seen.event.stamp_ns
         match seen.event:
             case GroundMapExtended() if self._first is not None:
@@ -121,7 +120,6 @@ class FirstKeyframes:
         self.voxels = VoxelMap(voxel_m)
 
     def add(self, image: GroundImage, T_ground_camera: SE3) -> None:
-        """Add a keyframe."""
         depth = image.depth[::FIRST_STRIDE_PX, ::FIRST_STRIDE_PX].ravel()
         colours = image.colour[::FIRST_STRIDE_PX, ::FIRST_STRIDE_PX].reshape(-1, 3)
         known = np.isfinite(depth)

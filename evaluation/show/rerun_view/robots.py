@@ -49,7 +49,6 @@ class GrowingPath:
         self._points: list[NDArray[np.float64]] = []
 
     def add(self, stamp_ns: int, position: NDArray[np.float64]) -> None:
-        """Continue the path to a position."""
         if not self._stamps_ns or stamp_ns - self._stamps_ns[-1] >= STEP_NS:
             self._stamps_ns.append(stamp_ns)
             self._points.append(position)
@@ -64,7 +63,6 @@ class GrowingPath:
     def drawn(
         self, colour: tuple[int, int, int], radius_m: float = PATH_RADIUS_M
     ) -> rr.LineStrips3D:
-        """The path as one line."""
         points = np.array(self._points, np.float32).reshape(-1, 3)
         return rr.LineStrips3D([points], colors=[colour], radii=[radius_m])
 
@@ -90,7 +88,6 @@ class MovingCamera:
         stream.put_in_frame(frames[0], entities[1])
 
     def draw(self, stamp_ns: int, T_frame_camera: SE3) -> None:
-        """Draw one pose."""
         self.path.add(stamp_ns, T_frame_camera.translation)
         if self._pose_pace.due(stamp_ns):
             placed = transform(T_frame_camera, *self._frames)
@@ -115,7 +112,6 @@ class Robots:
         }
 
     def see(self, seen: Seen) -> None:
-        """Draw the pose of a tracked image."""
         frame = seen.frame
         if isinstance(seen.event, MavTracked | GroundTracked):
             assert frame.pose.T_map_camera is not None
@@ -154,7 +150,6 @@ class TrueRobots:
         self._draw_scene()
 
     def see(self, seen: Seen) -> None:
-        """Draw the true pose of a tracked image."""
         event = seen.event
         if isinstance(event, GroundTracked) and not self._anchored:
             self._anchored = True

@@ -60,12 +60,10 @@ class RunView:
             self._parts.append(TrueRobots(stream, chosen, truth, calibrations))
 
     def see(self, seen: Seen) -> None:
-        """Draw one event."""
         for part in self._parts:
             part.see(seen)
 
     def close(self) -> None:
-        """End the file."""
         self._stream.close()
 
 

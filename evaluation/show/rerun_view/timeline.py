@@ -60,7 +60,6 @@ class Curves:
         self._styled: set[str] = set()
 
     def see(self, seen: Seen) -> None:
-        """Continue the curves that the event has values for."""
         stamp_ns = seen.event.stamp_ns
         match seen.event:
             case (
@@ -129,14 +128,12 @@ class Messages:
         self._state: dict[Source, type[Event]] = {}
 
     def see(self, seen: Seen) -> None:
-        """Write a message, if the event gives one."""
         message = self._tracking(seen) or _mapping(seen.event)
         if message is not None:
             text, level = message
             self._stream.log(seen.event.stamp_ns, MESSAGES, rr.TextLog(text, level=level))
 
     def _tracking(self, seen: Seen) -> Message | None:
-        """The state of a robot's tracking, where it changed."""
         kind, robot = type(seen.event), seen.frame.robot
         before = self._state.get(robot)
         if kind not in (MavTracked, GroundTracked, Initializing, TrackingLost) or kind is before:

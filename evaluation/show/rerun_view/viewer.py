@@ -41,7 +41,6 @@ class Ports:
 
     @property
     def page(self) -> str:
-        """Address of the page for a browser."""
         source = quote(f"rerun+http://localhost:{self.data}/proxy", safe="")
         return f"http://localhost:{self.web}/?url={source}"
 
@@ -59,7 +58,6 @@ def program() -> Path:
 
 
 def has_screen() -> bool:
-    """Whether a window can be opened."""
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
