@@ -114,7 +114,6 @@ def _first_hits(
     hit: I32,
 ) -> None:
     """Notes in `hit` the plane k where phi first falls below zero between k and k + 1.
-
     A crossing needs `votes` counts in the bins of the mask `near`. `hit` (columns,) is -1 before.
     """
     zero, plane = np.float32(0), np.int32(k)

@@ -39,7 +39,7 @@ class Bundler:
     """Puts the samples since the previous image before each image.
 
     A bundle has at most one message of inertial and one of magnetic samples. The samples of an
-    image that is left out go into the next bundle. `imu` and `magnetic` are None without such a sensor.
+    image that is left out go into the next bundle. `imu` or `magnetic` is None without the sensor.
     """
 
     robot: Source

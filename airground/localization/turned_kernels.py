@@ -21,8 +21,7 @@ MARGIN = 2
 def filled_cells(heights: F32, first_x: int, first_y: int) -> tuple[F32, float]:
     """The filled cells (3, K) of an aerial map: x, y [cells], height about the mean; the mean.
 
-    `heights` (nx, ny) [m] have NaN in holes; cell [0, 0] is `first_x`, `first_y` from the camera.
-    """
+    `heights` (nx, ny) [m] have NaN in holes; cell [0, 0] is `first_x`, `first_y` off the camera."""
     mean, count = mean_height(heights)
     cells = np.empty((3, count), np.float32)
     k = 0

@@ -45,7 +45,6 @@ def refine(
             return _refused(stamp_ns, start, "no overlap of the height maps around the start")
         start = found
 
-    # Point-to-plane ICP.
     target = make_surfels(nearby, settings.voxel_m)
     motion = point_to_plane_icp(source.points, target, start, settings)
     return _judged(stamp_ns, motion, source, target, settings)
