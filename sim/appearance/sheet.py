@@ -86,7 +86,7 @@ def fixed_point(points: NDArray) -> NDArray[np.int32]:
 
 
 def faded(pixels: NDArray, contrast: float) -> NDArray:
-    """A picture (..., 3) with `contrast` times its contrast around its mean colour; as it is if 1."""
+    """A picture (..., 3) with `contrast` times its contrast around its mean colour."""
     if contrast == 1.0:
         return pixels
     mean = pixels.mean(axis=tuple(range(pixels.ndim - 1)), dtype=np.float64)
@@ -122,7 +122,7 @@ def _multiply_rows(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _rows_around(y: float, image: NDArray, held: NDArray, stretched: NDArray) -> float:
-    """Have `stretched` (2, 3 C) hold the rows around height `y`, 0 (top) to 1; `held` (2,) lists them.
+    """Have `stretched` (2, 3 C) hold the rows around height `y`, 0 (top) to 1; `held` lists them.
     Returns the share of the lower row.
     """
     first, second, share = _between(y, image.shape[0])

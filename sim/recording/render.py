@@ -27,7 +27,7 @@ _MAX_DEVICES = 16
 
 
 class Renderer:
-    """Draws a world (`model` from `with_cameras`) from named pinhole cameras, in one graphics context.
+    """Draws a world (`model` from `with_cameras`) from named pinhole cameras.
 
     A context manager; the context belongs to the thread that made it.
 
