@@ -48,7 +48,10 @@ def test_help_answers_within_half_a_second() -> None:
 
 
 @pytest.mark.parametrize("verb", cli.VERBS)
-def test_every_verb_explains_itself(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_verb_explains_itself(
+    verb: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("COLUMNS", raising=False)
     assert exit_code(verb, "--help") == 0
     said = capsys.readouterr().out
     first_line = (cli.verb_class(verb).__doc__ or "").splitlines()[0]

@@ -225,7 +225,7 @@ def test_an_unknown_name_is_named_with_those_that_are_known() -> None:
 
 def test_a_file_front_end_needs_its_file() -> None:
     given = Ingredients(mav_sequence().calibration, Config(), np.random.default_rng(0))
-    with pytest.raises(InputError, match="needs the trajectory"):
+    with pytest.raises(InputError, match="needs a trajectory"):
         make_front_end(front_ends.MAV, "file", given)
 
 

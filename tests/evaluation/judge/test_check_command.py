@@ -156,11 +156,20 @@ def test_accepting_without_a_reason_changes_nothing(
     assert accepted.read_bytes() == before
 
 
-@pytest.mark.parametrize("word", ["--quick", "--trials 3", "--scenes tiny"])
-def test_the_suite_is_fixed(word: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("word", "complaint"),
+    [
+        ("--quick", "--suite and --quick are not allowed together"),
+        ("--set protocol.trials=3", "the suite fast is fixed"),
+        ("--scenes tiny", "the suite fast is fixed"),
+    ],
+)
+def test_the_suite_is_fixed(
+    word: str, complaint: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     words = ("reproduce", "--suite", "fast", *word.split(), "--out", tmp_path / "out")
     assert exit_code(*words) == console.EXIT_ERROR
-    assert "the suite fast is fixed" in one_error_line(capsys)
+    assert complaint in one_error_line(capsys)
 
 
 def test_markdown_is_a_table_of_every_metric() -> None:

@@ -117,7 +117,7 @@ BAD_WORDS = {
         "known: slam, file",
     ),
     "front end": (("--front-end", "orb"), "known: slam, open3d, opencv, file"),
-    "no file": (("--front-end", "file"), "needs the trajectory"),
+    "no file": (("--front-end", "file"), "needs a trajectory"),
     "no such calibration": (("--calibration", "x.yaml"), "x.yaml: this file"),
     "both robots": (("--mav", "x"), "--mav"),
 }
