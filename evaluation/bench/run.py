@@ -31,8 +31,8 @@ from evaluation.bench.report import (
 )
 from evaluation.bench.rows import BY_NAME, LIVE, PIPELINE, PLAYED, Contender, Row
 from evaluation.bench.work import interleaved, wall_ratio
+from evaluation.setup.condition import RunInfo
 from evaluation.setup.published import TimedStage
-from evaluation.setup.run_info import RunInfo
 
 AnyLane = Lane | LaneProcess
 

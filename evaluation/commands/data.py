@@ -9,8 +9,16 @@ from typing import Annotated, ClassVar, Literal
 from tyro.conf import Positional, UseAppendAction
 
 from airground.errors import InputError
-from evaluation.commands.estimates import RENDER_S_PER_S, work_s
-from evaluation.commands.options import OutOption, SeedOption, SensorOption, Shown, Verb, in_range
+from evaluation.commands.options import (
+    RENDER_S_PER_S,
+    OutOption,
+    SeedOption,
+    SensorOption,
+    Shown,
+    Verb,
+    in_range,
+    work_s,
+)
 from evaluation.setup.console import EXIT_FAULT_FOUND, EXIT_OK
 
 

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from tyro.conf import Positional
 
-from evaluation.commands.estimates import START_S, recorded
 from evaluation.commands.options import (
+    START_S,
     OutOption,
     PipelineOptions,
     SeedOption,
     Shown,
     Verb,
     in_range,
+    recorded,
 )
 from evaluation.commands.run import simulated, write_measured
 

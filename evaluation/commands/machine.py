@@ -7,8 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from evaluation.commands.estimates import RENDER_S_PER_S, work_s
-from evaluation.commands.options import SeedOption, SensorOption, Shown, Verb, in_range
+from evaluation.commands.options import (
+    RENDER_S_PER_S,
+    SeedOption,
+    SensorOption,
+    Shown,
+    Verb,
+    in_range,
+    work_s,
+)
 from evaluation.setup.console import EXIT_FAULT_FOUND, EXIT_OK
 
 if TYPE_CHECKING:

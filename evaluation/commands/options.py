@@ -1,7 +1,9 @@
-"""Options that several verbs share, in groups. Nothing heavy is imported at the top of this file.
+"""Options that several verbs share, in groups, and estimates of how long verbs take.
 
-A verb is a dataclass; each of its bases is a group of options. An option is a field: its docstring
-is its help, and `Shown` says how the help writes its value.
+Nothing heavy is imported at the top of this file. A verb is a dataclass; each of its bases is a
+group of options. An option is a field: its docstring is its help, and `Shown` says how the help
+writes its value. Estimates are rough factors from an idle machine of 2022 with two cores
+(docs/speed.md, docs/results.md), in seconds of one core per recorded second, unless stated.
 """
 
 from __future__ import annotations
@@ -20,6 +22,27 @@ from evaluation.setup.environment import usable_cores
 if TYPE_CHECKING:
     from evaluation.setup.settings import Settings
     from evaluation.setup.setups import Setup
+
+START_S = 20.0
+"""Start of processes, compiled kernels from the cache, and the report [s]."""
+RUN_S_PER_S = 0.6
+"""Duration of `run` per recorded second, on two cores: 29 s for 52 s, and slower machines."""
+TRACK_S_PER_S = 0.5
+"""One front end over one robot's images: 15 ms per image at 30 Hz."""
+RENDER_S_PER_S = 3.0
+"""Images of both robots: 2 to 7 by the scene."""
+MEASURE_S_PER_S = 3.0
+"""The paper's protocol with one kind of maps: 2 without baselines, 4 with all of them."""
+
+
+def work_s(core_s: float, cores: int) -> float:
+    """Duration of work that is spread over cores [s]."""
+    return START_S + core_s / max(1, cores)
+
+
+def recorded(name: Path | str, seconds: float) -> str:
+    """How messages name a recording: with its length."""
+    return f"{name} ({seconds:.0f} s recorded)"
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from tyro.conf import create_mutex_group
 
 from airground.errors import InputError
-from evaluation.commands.estimates import MEASURE_S_PER_S, RENDER_S_PER_S, work_s
 from evaluation.commands.options import (
+    MEASURE_S_PER_S,
+    RENDER_S_PER_S,
     ClusterOption,
     PipelineOptions,
     ResumableOutOption,
@@ -19,6 +20,7 @@ from evaluation.commands.options import (
     Shown,
     Verb,
     in_range,
+    work_s,
 )
 
 if TYPE_CHECKING:

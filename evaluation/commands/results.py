@@ -13,7 +13,7 @@ from evaluation.commands.options import OutOption, Shown, Verb
 from evaluation.setup.console import EXIT_OK, EXIT_WORSE
 
 if TYPE_CHECKING:
-    from evaluation.judge.measured import Measured
+    from evaluation.judge.accepted import Measured
 
 ACCEPTED = Path(__file__).parents[1] / "accepted.json"
 
@@ -87,7 +87,7 @@ class Check(Verb):
     """write one test case per metric for continuous integration"""
 
     def main(self) -> int:
-        from evaluation.judge.measured import Measured
+        from evaluation.judge.accepted import Measured
         from evaluation.judge.results import read_table
         from evaluation.judge.verdict import Verdict, compare
         from evaluation.show.comparison import verdict_table
@@ -103,8 +103,7 @@ class Check(Verb):
         return EXIT_WORSE if comparison.of(Verdict.WORSE) else EXIT_OK
 
     def _reference(self) -> Measured:
-        from evaluation.judge.accepted import Accepted
-        from evaluation.judge.measured import Measured
+        from evaluation.judge.accepted import Accepted, Measured
         from evaluation.judge.results import read_table
 
         if self.against.is_dir():
@@ -130,8 +129,7 @@ class Accept(Verb):
     def main(self) -> None:
         from datetime import UTC, datetime
 
-        from evaluation.judge.accepted import Accepted
-        from evaluation.judge.measured import Measured
+        from evaluation.judge.accepted import Accepted, Measured
         from evaluation.judge.results import SUMMARY, read_table
         from evaluation.judge.summary import Summary
 

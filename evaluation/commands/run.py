@@ -11,8 +11,16 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 from tyro.conf import Positional
 
 from airground.errors import InputError
-from evaluation.commands.estimates import RUN_S_PER_S, START_S, recorded
-from evaluation.commands.options import OutOption, PipelineOptions, SeedOption, Shown, Verb
+from evaluation.commands.options import (
+    RUN_S_PER_S,
+    START_S,
+    OutOption,
+    PipelineOptions,
+    SeedOption,
+    Shown,
+    Verb,
+    recorded,
+)
 
 if TYPE_CHECKING:
     from airground.io.recording import Recording

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 from tyro.conf import UseAppendAction
 
 from airground.errors import InputError
-from evaluation.commands.estimates import MEASURE_S_PER_S, RENDER_S_PER_S, work_s
 from evaluation.commands.options import (
+    MEASURE_S_PER_S,
+    RENDER_S_PER_S,
     ClusterOption,
     PipelineOptions,
     ResumableOutOption,
@@ -18,6 +19,7 @@ from evaluation.commands.options import (
     Shown,
     Verb,
     in_range,
+    work_s,
 )
 
 if TYPE_CHECKING:

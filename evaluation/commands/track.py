@@ -10,8 +10,16 @@ from tyro.conf import Positional
 
 from airground.errors import InputError
 from airground.io.layout import HEADER
-from evaluation.commands.estimates import START_S, TRACK_S_PER_S, recorded
-from evaluation.commands.options import ConfigOptions, OutOption, SeedOption, Shown, Verb
+from evaluation.commands.options import (
+    START_S,
+    TRACK_S_PER_S,
+    ConfigOptions,
+    OutOption,
+    SeedOption,
+    Shown,
+    Verb,
+    recorded,
+)
 
 if TYPE_CHECKING:
     from airground.core.cloud import Source

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from airground.config import Config
 from airground.errors import InputError
-from evaluation.judge.measured import Measured
+from evaluation.judge.accepted import Measured
 from evaluation.judge.results import SUMMARY, read_results
 from evaluation.judge.samples import Flight
 from evaluation.judge.summary import Summary

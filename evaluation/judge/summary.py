@@ -27,8 +27,7 @@ from evaluation.judge.poses import Slam, SlamRobot
 from evaluation.judge.readings import median, rate, rate_of, real_time_factor, spread
 from evaluation.judge.samples import localization, located, refined
 from evaluation.setup.checked_json import Count, Number, Part, Share, number, read_checked
-from evaluation.setup.condition import Condition
-from evaluation.setup.run_info import RunInfo
+from evaluation.setup.condition import Condition, RunInfo
 from evaluation.table.intervals import Quantiles, quantiles
 from evaluation.table.limits import LOCATED_M, NEAR_M
 from evaluation.table.rows import ResultTable

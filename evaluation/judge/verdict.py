@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.errors import InputError
-from evaluation.judge.measured import Measured, figure, flight_value
+from evaluation.judge.accepted import Measured, figure, flight_value
 from evaluation.judge.metrics import WATCHED, Metric
 from evaluation.judge.samples import Samples
 from evaluation.setup.condition import Condition

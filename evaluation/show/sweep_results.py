@@ -22,7 +22,7 @@ from evaluation.judge.sweep import SWEPT, Measured
 from evaluation.measure.plans.dials import Value, unit_of
 from evaluation.measure.plans.sweep import SweepPlan
 from evaluation.measure.work.code_version import code_version
-from evaluation.setup.run_info import RunInfo
+from evaluation.setup.condition import RunInfo
 from evaluation.setup.settings import write_config
 from evaluation.setup.text import MISSING, TextTable, percent, print_table
 from evaluation.show.figures.style import LABEL_PT, SERIES, SMALL_PT, WIDE_IN, save_figure, styled

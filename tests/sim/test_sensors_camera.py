@@ -5,13 +5,7 @@ import pytest
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from sim.sensors.camera import (
-    MAX_SAMPLES,
-    ExposureDrift,
-    ImageSensor,
-    _motion_terms,
-    _row_motion,
-)
+from sim.sensors.camera import MAX_SAMPLES, ExposureDrift, ImageSensor, _motion_terms, _row_motion
 from sim.sensors.hashed_noise import gaussian, noise_key
 from sim.sensors.presets import HARSH, NOMINAL, ImageNoise
 

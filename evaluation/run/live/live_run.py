@@ -21,13 +21,7 @@ from airground.tracking import TrackedFrame
 from evaluation.run.driver import drive, pipeline_for
 from evaluation.run.drops import SCHEMA, DropList, Stamps, fingerprint
 from evaluation.run.live.arrivals import Stream, in_order
-from evaluation.run.live.playback import (
-    LiveTask,
-    Playback,
-    PlaybackClock,
-    RobotReport,
-    play_robot,
-)
+from evaluation.run.live.playback import LiveTask, Playback, PlaybackClock, RobotReport, play_robot
 from evaluation.run.onlooker import Seen
 from evaluation.run.recording import RunResult, RunRows
 from evaluation.run.robot_process import RobotProcess, RobotTask

@@ -15,8 +15,7 @@ from evaluation.judge.results import CONFIG, SHOWCASE, SUMMARY, TABLE, Results
 from evaluation.judge.summary import Summary, build_summary
 from evaluation.measure.showcase import Showcase
 from evaluation.setup import published
-from evaluation.setup.condition import shared_parts
-from evaluation.setup.run_info import RunInfo
+from evaluation.setup.condition import RunInfo, shared_parts
 from evaluation.setup.settings import write_config
 from evaluation.show.figures.style import ReportFigure, save_figure
 from evaluation.show.report.baselines import baseline_table

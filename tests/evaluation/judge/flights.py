@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from evaluation.judge.measured import Measured
+from evaluation.judge.accepted import Measured
 from evaluation.setup.condition import Condition
 from evaluation.table.rows import ResultTable, Row
 

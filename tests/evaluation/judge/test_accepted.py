@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from airground.errors import InputError
-from evaluation.judge.accepted import Accepted
-from evaluation.judge.measured import Measured
+from evaluation.judge.accepted import Accepted, Measured
 from evaluation.table.rows import ResultTable
 from tests.evaluation.judge.flights import make_results
 

@@ -14,7 +14,7 @@ from evaluation.judge.metrics import WATCHED
 from evaluation.judge.summary import build_summary
 from evaluation.judge.verdict import compare
 from evaluation.setup import console
-from evaluation.setup.run_info import RunInfo
+from evaluation.setup.condition import RunInfo
 from evaluation.show.comparison.verdict_table import HEADER, cells, markdown, print_comparison
 from evaluation.table.rows import ResultTable
 from tests.evaluation.judge.flights import make_results, measured

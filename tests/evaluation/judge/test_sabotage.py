@@ -20,7 +20,7 @@ from airground.core.sighting import Sighting
 from airground.core.surface import AerialSurface
 from airground.localization import cost_map, height_map_pair
 from airground.localization.particle_filter import MonteCarloLocalizer
-from evaluation.judge.measured import Measured
+from evaluation.judge.accepted import Measured
 from evaluation.judge.verdict import Comparison, Verdict, compare
 from evaluation.measure.protocol.trials import localize_sequence
 from evaluation.measure.protocol.wide_search import add_wide_searches

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from evaluation.judge.measured import figure
+from evaluation.judge.accepted import figure
 from evaluation.judge.metrics import WATCHED
 from evaluation.judge.samples import Flight
 from evaluation.setup.condition import Condition

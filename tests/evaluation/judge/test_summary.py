@@ -9,8 +9,7 @@ from rich.console import Console
 
 from airground.errors import InputError
 from evaluation.judge.summary import Summary, build_summary
-from evaluation.setup.condition import Condition
-from evaluation.setup.run_info import RunInfo
+from evaluation.setup.condition import Condition, RunInfo
 from evaluation.show.report.screen import print_summary
 from evaluation.table.rows import ResultTable, Row
 from tests.evaluation.synthetic_results import BEST, PAPER, SCENES, make_table

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from airground.errors import InputError
-from evaluation.judge.measured import Measured
+from evaluation.judge.accepted import Measured
 from evaluation.judge.metrics import WATCHED
 from evaluation.judge.verdict import ALPHA, Verdict, compare
 from evaluation.table.comparison import least_paired_p

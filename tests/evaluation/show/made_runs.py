@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from airground.config import Config
-from evaluation.judge.measured import Measured
+from evaluation.judge.accepted import Measured
 from evaluation.judge.runs import Run
 from evaluation.judge.summary import build_summary
-from evaluation.setup.run_info import RunInfo
+from evaluation.setup.condition import RunInfo
 from evaluation.table.rows import ResultTable
 
 INFO = RunInfo("0.1.0", "abc123", 0, "some CPU", 2)

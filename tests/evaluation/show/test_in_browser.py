@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from evaluation.judge.runs import against
-from evaluation.setup.run_info import RunInfo
+from evaluation.setup.condition import RunInfo
 from evaluation.show.comparison.page import PAGE, write_comparison
 from evaluation.show.report.page import write_report
 from tests.evaluation.judge.flights import make_results

@@ -12,18 +12,12 @@ from PIL import Image
 from evaluation.judge.claims import localization_claims
 from evaluation.judge.metrics import METRICS
 from evaluation.judge.readings import rate
-from evaluation.setup.condition import Condition
-from evaluation.setup.run_info import RunInfo
+from evaluation.setup.condition import Condition, RunInfo
 from evaluation.setup.text import degrees, metres
 from evaluation.show.report.failures import control_table, failures
 from evaluation.show.report.figures import report_figures
 from evaluation.show.report.page import write_report
-from evaluation.show.report.tables import (
-    comparison_table,
-    headlines,
-    scene_table,
-    timing_table,
-)
+from evaluation.show.report.tables import comparison_table, headlines, scene_table, timing_table
 from evaluation.show.report.trajectories import trajectory_figures, trajectory_table
 from evaluation.table.rows import ResultTable, Row
 from tests.evaluation.synthetic_results import BEST, DRIFT, MINMAX, PAPER, SCENES, make_table
