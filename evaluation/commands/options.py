@@ -122,8 +122,8 @@ class SensorOption:
 
     heading: ClassVar[str] = "input"
 
-    sensors: Literal["none", "nominal", "harsh"] = "nominal"
-    """noise of the sensors"""
+    sensors: Literal["none", "nominal", "harsh", "paper"] = "nominal"
+    """noise and calibration errors; paper: sensors of 2013"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,7 +17,7 @@ class Condition:
     Attributes:
         preset: "paper" or "best".
         poses: "slam", "oracle exact", "oracle with drift", or "slam, exact mav" (or ground).
-        sensors: "none", "nominal" or "harsh".
+        sensors: "none", "nominal", "harsh" or "paper".
         heading: "known" or "search".
         variant: Other differences from the preset, as text; empty without any.
     """

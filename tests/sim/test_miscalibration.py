@@ -6,7 +6,7 @@ import pytest
 from airground.core.se3 import SE3
 from sim.robots.robot_motion import Mounting
 from sim.sensors.miscalibration import Calibrations, calibrate
-from sim.sensors.presets import HARSH, NOMINAL, NONE, SensorPreset
+from sim.sensors.presets import HARSH, NOMINAL, NONE, PAPER, SensorPreset
 
 MAV = Mounting(
     SE3.from_heading(0.5, (0.0, 0.01, 0.02)), SE3.from_rotation_vector((3, 0.2, 0), (0.1, 0, 0))
@@ -26,23 +26,32 @@ def test_without_errors_the_calibration_is_true() -> None:
         np.testing.assert_allclose(one.T_imu_camera, other.T_imu_camera, atol=1e-12)
 
 
-@pytest.mark.parametrize(("preset", "times"), [(NOMINAL, 1), (HARSH, 3)])
+@pytest.mark.parametrize("preset", [NOMINAL, HARSH, PAPER], ids=lambda preset: preset.name)
 @pytest.mark.parametrize("robot", ["mav", "ground"])
-def test_sizes_of_the_errors(preset: SensorPreset, times: int, robot: str) -> None:
+def test_sizes_of_the_errors(preset: SensorPreset, robot: str) -> None:
+    errors = preset.calibration
+    assert errors is not None
     calibrations = drawn(preset)
     true, nominal = getattr(calibrations.true, robot), getattr(calibrations.nominal, robot)
-    assert abs(nominal.camera.fx / true.camera.fx - 1) == pytest.approx(times * 1e-3)
+    assert abs(nominal.camera.fx / true.camera.fx - 1) == pytest.approx(errors.focal)
     assert nominal.camera.fx == nominal.camera.fy
     turn = true.calibration().T_imu_camera.inverse() @ nominal.calibration().T_imu_camera
-    assert np.rad2deg(turn.angle()) == pytest.approx(times * 0.1)
+    assert turn.angle() == pytest.approx(errors.camera_to_imu)
     assert np.abs(turn.translation).max() < 1e-12
     assert nominal.T_body_imu == true.T_body_imu
     assert nominal.camera.time_offset_ns == 0
-    assert abs(true.camera.time_offset_ns) == times * 1_000_000
+    assert abs(true.camera.time_offset_ns) == errors.time_offset_ns
     scale = (
         calibrations.true.ground.depth.units_per_m / calibrations.nominal.ground.depth.units_per_m
     )
-    assert abs(scale - 1) == pytest.approx(times * 3e-3)
+    assert abs(scale - 1) == pytest.approx(errors.depth_scale)
+
+
+def test_harsh_is_three_times_nominal() -> None:
+    assert NOMINAL.calibration is not None
+    assert HARSH.calibration is not None
+    for name, value in vars(NOMINAL.calibration).items():
+        assert getattr(HARSH.calibration, name) == pytest.approx(3 * value), name
 
 
 def test_signs_are_drawn_by_the_seed() -> None:
