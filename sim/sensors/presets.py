@@ -130,7 +130,7 @@ ADIS16448 = ImuNoise(
     accelerometer_bias=5e-2,
 )
 
-# MPU-6000 (InvenSense, PS-MPU-6000A, rev. 3.4, 2013). Noise: 0.005 deg/s/sqrt(Hz), 400 ug/sqrt(Hz).
+# MPU-6000 (InvenSense PS-MPU-6000A, rev. 3.4, 2013): 0.005 deg/s/sqrt(Hz), 400 ug/sqrt(Hz).
 # Biases: the gyro is zeroed before take-off, and 1 K later it is 0.3 deg/s off (40 deg/s over 125 K);
 # the accelerometer is calibrated in another room, and 10 K away it is 10 mg off (70 mg over 70 K).
 # The data sheet gives no walks: those of EuRoC's IMU.
