@@ -131,9 +131,9 @@ ADIS16448 = ImuNoise(
 )
 
 # MPU-6000 (InvenSense PS-MPU-6000A, rev. 3.4, 2013): 0.005 deg/s/sqrt(Hz), 400 ug/sqrt(Hz).
-# Biases: the gyro is zeroed before take-off, and 1 K later it is 0.3 deg/s off (40 deg/s over 125 K);
-# the accelerometer is calibrated in another room, and 10 K away it is 10 mg off (70 mg over 70 K).
-# The data sheet gives no walks: those of EuRoC's IMU.
+# Biases by its changes with temperature: the gyro's (40 deg/s over 125 K) 1 K after it was zeroed,
+# the accelerometer's (70 mg over 70 K) 10 K from where it was calibrated. It states no random
+# walks: those of EuRoC's IMU.
 MPU6000 = ImuNoise(
     gyro_density=8.73e-5,
     gyro_walk=ADIS16448.gyro_walk,
