@@ -134,8 +134,10 @@ class ConfigOptions:
     sections: ClassVar[tuple[str, ...]] = ()
     """Sections of the configuration that the verb uses beside the pipeline's."""
 
-    preset: Annotated[Literal["paper", "best"] | None, Shown("{paper,best}", "best")] = None
-    """constants as published, or ours"""
+    preset: Annotated[Literal["best", "paper", "paper_literal"] | None, Shown("NAME", "best")] = (
+        None
+    )
+    """best: ours; paper: constants as published; paper_literal: with sigma as printed"""
     config: Annotated[Path | None, Shown("FILE")] = None
     """TOML file with any parameters (docs/parameters.md)"""
     overrides: Annotated[

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
@@ -16,7 +16,6 @@ from evaluation.commands.options import (
     PipelineOptions,
     ResumableOutOption,
     SeedOption,
-    SensorOption,
     Shown,
     Verb,
     in_range,
@@ -27,13 +26,39 @@ if TYPE_CHECKING:
     from evaluation.measure.plans.reproduce import Plan
     from evaluation.measure.protocol.trials import Protocol
 
-SCENES = ("indoor_a", "indoor_b", "indoor_c", "outdoor", "flat")
-FLIGHTS, SEQUENCES, TRIALS, BASELINES = 2, 6, 9, 12
-"""Over four scenes with structure: 48 sequences and 72 trials; the paper has 41 and 67."""
 
-QUICK_SCENES = ("tiny",)
-QUICK_FLIGHTS, QUICK_SEQUENCES, QUICK_TRIALS, QUICK_BASELINES = 1, 4, 8, 0
+@dataclass(frozen=True)
+class Extent:
+    """What is flown and measured where no option says otherwise.
 
+    Attributes:
+        scenes: Scenes to fly over.
+        flights: Flights over each.
+        sequences, trials, baselines: Numbers on each flight, as of `Protocol`.
+        heaps: Whether every flight is over a heap of its own.
+        sensors: Sensor preset.
+        negatives: Whether negative cases are tried.
+    """
+
+    scenes: tuple[str, ...]
+    flights: int
+    sequences: int
+    trials: int
+    baselines: int
+    heaps: bool = False
+    sensors: str = "nominal"
+    negatives: bool = True
+
+
+FULL = Extent(("indoor_a", "indoor_b", "indoor_c", "outdoor", "flat"), 2, 6, 9, 12)
+"""Over four scenes with structure: 48 sequences and 72 trials."""
+TWIN = Extent(
+    ("paper_a", "paper_b", "paper_c", "paper_outdoor"), 3, 5, 8, 7,
+    heaps=True, sensors="paper", negatives=False,
+)  # fmt: skip
+"""The paper's four datasets: indoors 45 sequences and 72 trials, where the paper has 41 and 67;
+outdoors pictures and matches of images."""
+QUICK = Extent(("tiny",), 1, 4, 8, 0)
 
 _SMALLER = create_mutex_group(required=False)
 _STORAGE = create_mutex_group(required=False)
@@ -53,7 +78,6 @@ class RecordingOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class Reproduce(
-    SensorOption,
     SeedOption,
     PipelineOptions,
     ResumableOutOption,
@@ -64,8 +88,10 @@ class Reproduce(
     """Do all of it: the paper's protocol, from scenes to report.
 
     Records flights over several scenes, measures the setup asked for and those that the report
-    compares it with, and writes results.parquet, summary.json and report.html. Section protocol
-    of the configuration says how much is measured on each flight (docs/parameters.md).
+    compares it with, and writes results.parquet, summary.json and report.html. With --preset
+    paper it repeats the paper's experiments, with sensors of their time, and says which of its
+    figures come out (docs/reproduce_the_paper.md). Section protocol of the configuration says how
+    much is measured on each flight (docs/parameters.md).
     """
 
     sections: ClassVar[tuple[str, ...]] = ("oracle", "protocol")
@@ -74,10 +100,18 @@ class Reproduce(
     """one small scene and a short flight: minutes instead of hours"""
     suite: Annotated[Literal["fast"] | None, _SMALLER, Shown("fast")] = None
     """the fixed small suite for check, with the setup asked for only"""
-    scenes: Annotated[tuple[str, ...], Shown("SCENE ...", " ".join(SCENES))] = ()
+    sensors: Annotated[
+        Literal["none", "nominal", "harsh", "paper"] | None,
+        Shown("NAME", "nominal, or paper with --preset paper"),
+    ] = None
+    """noise of the sensors"""
+    scenes: Annotated[
+        tuple[str, ...],
+        Shown("SCENE ...", "the indoor scenes, outdoor, flat; the paper's datasets"),
+    ] = ()
     """scenes to fly over"""
-    flights: Annotated[int | None, Shown("N", f"{FLIGHTS}")] = None
-    """flights over each scene"""
+    flights: Annotated[int | None, Shown("N", f"{FULL.flights}; {TWIN.flights}")] = None
+    """flights over each scene; with --preset paper each over a heap of its own"""
     sequences: Annotated[int | None, Shown("N", "what the flights give")] = None
     """at least so many in all, over further heaps"""
     alone: bool = False
@@ -120,7 +154,7 @@ class Reproduce(
                 raise InputError(f"--{field}: the suite {name} is fixed; give it without --suite")
         if self.settings().protocol != ProtocolCounts():
             raise InputError(f"section protocol: the suite {name} is fixed")
-        sensors = sensor_preset(self.sensors)
+        sensors = sensor_preset(self.sensors or FULL.sensors)
         return SUITES[name].plan(self.setup(), sensors, self.checked_seed())
 
     def plan(self) -> Plan:
@@ -133,36 +167,42 @@ class Reproduce(
         setup = self.setup()
         if self.budget and setup.poses != "slam":
             raise InputError("--budget asks what SLAM loses among others; give --poses slam")
-        names = self.scenes or (QUICK_SCENES if self.quick else SCENES)
+        extent = self._extent(setup.config.preset)
         return Plan(
             flights=flights_over(
-                [load_scene(name) for name in names],
-                self._count("--flights", self.flights, QUICK_FLIGHTS, FLIGHTS),
-                sensor_preset(self.sensors),
+                [load_scene(name) for name in self.scenes or extent.scenes],
+                self._count("--flights", self.flights, extent.flights),
+                sensor_preset(self.sensors or extent.sensors),
                 self.checked_seed(),
+                extent.heaps,
             ),
             setups=[setup] if self.alone else with_companions(setup, few=self.quick),
-            protocol=self._protocol(),
+            protocol=self._protocol(extent),
             budget=self.budget,
+            negatives=extent.negatives,
             sequences=int(in_range("--sequences", self.sequences or 0)),
         )
 
-    def _protocol(self) -> Protocol:
+    def _extent(self, preset: str) -> Extent:
+        sensors = FULL.sensors if preset == "best" else TWIN.sensors
+        if self.quick:
+            return replace(QUICK, sensors=sensors)
+        return FULL if preset == "best" else TWIN
+
+    def _protocol(self, extent: Extent) -> Protocol:
         from evaluation.measure.protocol.trials import Protocol
 
         asked = self.settings().protocol
         return Protocol(
             sequences=self._count(
-                "sequences_per_flight", asked.sequences_per_flight, QUICK_SEQUENCES, SEQUENCES
+                "sequences_per_flight", asked.sequences_per_flight, extent.sequences
             ),
-            trials=self._count("trials", asked.trials, QUICK_TRIALS, TRIALS),
-            baselines=self._count("baselines", asked.baselines, QUICK_BASELINES, BASELINES, low=0),
+            trials=self._count("trials", asked.trials, extent.trials),
+            baselines=self._count("baselines", asked.baselines, extent.baselines, low=0),
         )
 
-    def _count(self, word: str, asked: int | None, quick: int, full: int, low: int = 1) -> int:
-        if asked is None:
-            return quick if self.quick else full
-        return int(in_range(word, asked, low=low))
+    def _count(self, word: str, asked: int | None, usual: int, low: int = 1) -> int:
+        return usual if asked is None else int(in_range(word, asked, low=low))
 
     def _core_s(self, plan: Plan) -> float:
         """Work to be expected at most, for what is finished already is not done again [s]."""

@@ -70,7 +70,7 @@ class Metric:
 
     def samples(self, table: ResultTable) -> Samples:
         """Its values in a table of one condition, by flight."""
-        part = table.controls() if self.controls else table.without_controls()
+        part = table.controls() if self.controls else table.scored()
         return samples.by_flight(part, self.take(part), self.failure)
 
     def text(self, value: float) -> str:

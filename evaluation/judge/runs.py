@@ -44,7 +44,7 @@ class Run:
         kept = [
             Flight(str(scene), int(seed), int(flight)) in flights for scene, seed, flight in keys
         ]
-        return ResultTable(self.table.frame[kept]).without_controls()
+        return ResultTable(self.table.frame[kept]).scored()
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 A summary is of one condition. All keys are always there. A quantile that failures reach (they
 count as infinite) is null, and so is what was not measured: all of `slam` with poses from an
-oracle, `realtime` without a live run.
+oracle, `realtime` without a live run, `reproduction` with the preset `best`.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
+from airground.config import PresetName
 from airground.errors import InputError
 from evaluation.judge.claims import (
     CalibrationSummary,
@@ -25,6 +26,7 @@ from evaluation.judge.live_summary import LiveSummary, live_summary
 from evaluation.judge.metrics import METRICS
 from evaluation.judge.poses import Slam, SlamRobot
 from evaluation.judge.readings import median, rate, rate_of, real_time_factor, spread
+from evaluation.judge.reproduction import Reproduced, reproduction_summary
 from evaluation.judge.samples import localization, located, refined
 from evaluation.setup.checked_json import Count, Number, Part, Share, number, read_checked
 from evaluation.setup.condition import Condition, RunInfo
@@ -121,7 +123,7 @@ class Summary(Part):
     schema_: Literal[1] = Field(alias="schema")
     version: str
     git_revision: str
-    preset: Literal["paper", "best"]
+    preset: PresetName
     poses: Literal["oracle", "slam"]
     seed: int
     scenes: list[str]
@@ -135,6 +137,7 @@ class Summary(Part):
     realtime: LiveSummary | None = None
     claims: ClaimsSummary | None = None
     calibration: CalibrationSummary | None = None
+    reproduction: dict[str, Reproduced] | None = None
 
     def write(self, path: Path) -> None:
         text = json.dumps(self.model_dump(by_alias=True), indent=2, allow_nan=False)
@@ -154,7 +157,7 @@ def build_summary(table: ResultTable, condition: Condition, run: RunInfo) -> Sum
         InputError: The table has no row under this condition.
     """
     of_condition = table.of(condition)
-    measured = of_condition.without_controls()
+    measured = of_condition.scored()
     if len(measured) == 0:
         raise InputError(f"results: nothing was measured with {condition.label()}")
     return Summary(
@@ -177,6 +180,7 @@ def build_summary(table: ResultTable, condition: Condition, run: RunInfo) -> Sum
         realtime=live_summary(measured),
         claims=claims_summary(of_condition),
         calibration=calibration_summary(measured),
+        reproduction=None if condition.preset == "best" else reproduction_summary(of_condition),
     )
 
 

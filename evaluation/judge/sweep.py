@@ -46,7 +46,7 @@ def sweep(plan: SweepPlan, store: UnitStore, crew: Crew) -> list[Measured]:
     measured = []
     for point, at_point in zip(points, units, strict=True):
         table = ResultTable.concat([next(found).table for _ in at_point]).without(CLOCK_STAGES)
-        read_here = table.without_controls()
+        read_here = table.scored()
         readings = {key: read(metric, read_here) for key, metric in SWEPT.items()}
         measured.append(Measured(point, table, readings))
     return measured

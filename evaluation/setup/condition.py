@@ -15,7 +15,7 @@ class Condition:
     """The condition of a measurement.
 
     Attributes:
-        preset: "paper" or "best".
+        preset: "best", "paper" or "paper_literal".
         poses: "slam", "oracle exact", "oracle with drift", or "slam, exact mav" (or ground).
         sensors: "none", "nominal", "harsh" or "paper".
         heading: "known" or "search".

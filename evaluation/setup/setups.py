@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from airground.config import Config, paper
+from airground.config import Config, paper, paper_literal
 from airground.core.cloud import PointCloud
 from airground.core.trajectory import Trajectory
 from evaluation.setup.condition import Condition
@@ -132,15 +132,16 @@ def with_localization(config: Config, **changes: object) -> Config:
 
 def with_companions(primary: Setup, few: bool = False) -> list[Setup]:
     """The primary setup, then what the report shows beside it.
-    `few` leaves only the true poses, and the paper's constants with both readings of its sigma."""
-    best, published = Config(), paper()
-    minmax = with_localization(published, sigma_units="minmax")
-    companions = [
-        Setup(best, "oracle"),
-        Setup(published),
-        Setup(minmax, variant="sigma 0.08 of the cost scaled to [0, 1]"),
-    ]
-    if not few:
-        companions += [Setup(best), Setup(with_localization(best, heading="search"))]
+
+    `best` stands beside the paper's constants in both readings of sigma, and the reverse; unless
+    `few`, `best` also beside itself with true poses and with a searched heading.
+    """
+    best, published, literal = Setup(Config()), Setup(paper()), Setup(paper_literal())
+    if primary.config.preset != "best":
+        companions = [literal, best, published]
+    else:
+        companions = [Setup(Config(), "oracle"), published, literal]
+        if not few:
+            companions += [best, Setup(with_localization(Config(), heading="search"))]
     known = (primary.config, primary.poses, primary.noise)
     return [primary, *(o for o in companions if (o.config, o.poses, o.noise) != known)]

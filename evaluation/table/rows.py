@@ -15,6 +15,10 @@ from evaluation.setup.condition import Condition
 
 CONTROL_SCENES = frozenset({"flat"})
 """Scenes without structure, in which the right answer is to claim nothing."""
+OUTDOOR_SCENES = frozenset({"outdoor", "paper_outdoor"})
+UNSCORED_SCENES = CONTROL_SCENES | {"paper_outdoor"}
+"""Scenes that count in no accuracy: controls, and the twin of the paper's outdoor dataset, for
+which the paper has pictures and no truth."""
 
 CLOCK_STAGES = frozenset({"timing", "run"})
 """Stages whose rows depend on the machine and on what else it does."""
@@ -140,11 +144,20 @@ class ResultTable:
         """Without the rows of some stages."""
         return ResultTable(self.frame[~self.frame["stage"].isin(list(stages))])
 
-    def without_controls(self) -> ResultTable:
-        """Without the control scenes, unless there are no others. Where there is nothing to find,
+    def scored(self) -> ResultTable:
+        """Without the unscored scenes, unless there are no others. Where there is nothing to find,
         being lost is no failure; such scenes are judged by `controls` instead."""
-        others = [scene for scene in self.scenes() if scene not in CONTROL_SCENES]
+        others = [scene for scene in self.scenes() if scene not in UNSCORED_SCENES]
         return self.of_scenes(others) if others else self
+
+    def outdoors(self) -> ResultTable:
+        """Only the outdoor scenes."""
+        return self.of_scenes(OUTDOOR_SCENES)
+
+    def indoors(self) -> ResultTable:
+        """Neither outdoor nor control scenes."""
+        others = OUTDOOR_SCENES | CONTROL_SCENES
+        return self.of_scenes(scene for scene in self.scenes() if scene not in others)
 
     def controls(self) -> ResultTable:
         """Only the control scenes."""

@@ -13,7 +13,7 @@ from evaluation.measure.work.crew import Crew
 from evaluation.measure.work.measure import measure, recorded, recording_name
 from evaluation.measure.work.unit import Finished, Unit, UnitStore, grouped
 from evaluation.setup.setups import Setup
-from evaluation.table.rows import CONTROL_SCENES, SEQUENCE_KEYS
+from evaluation.table.rows import CONTROL_SCENES, SEQUENCE_KEYS, UNSCORED_SCENES
 from sim.recording.recorder import Flight
 from sim.scene import Scene
 from sim.sensors.presets import SensorPreset
@@ -31,7 +31,7 @@ class Plan:
         protocol: Extent of the measurements on each flight.
         budget: Whether to measure the error budget of the primary setup.
         negatives: Whether to try the negative cases with the primary setup.
-        sequences: Smallest number of sequences of the primary setup, control scenes excluded;
+        sequences: Smallest number of sequences of the primary setup, unscored scenes excluded;
             0 for those that `flights` give.
     """
 
@@ -43,10 +43,12 @@ class Plan:
     sequences: int = 0
 
     def further_flights(self) -> Iterator[Flight]:
-        """The same flights with the next seeds, without end, control scenes excluded."""
-        flights = [flight for flight in self.flights if _has_places(flight)]
+        """The same flights with the next seeds, without end, unscored scenes excluded."""
+        flights = [f for f in self.flights if f.scene.name not in UNSCORED_SCENES]
+        seeds = {flight.seed for flight in flights}
         for step in count(1) if flights else ():
-            yield from (replace(flight, seed=flight.seed + step) for flight in flights)
+            ahead = step * (max(seeds) - min(seeds) + 1)
+            yield from (replace(flight, seed=flight.seed + ahead) for flight in flights)
 
     def tasks(self) -> int:
         """Number of groups of units on the first flights, each one task of a worker."""
@@ -69,7 +71,7 @@ class Plan:
             # No flight gives more sequences than this, so no flight is flown in vain.
             flights = list(islice(further, -(-missing // self.protocol.sequences)))
             if not flights:
-                break  # only control scenes
+                break  # only unscored scenes
             flown += self._flown(flights, recordings, store, crew)
         return Finished.merged([unit for units in flown for unit in units])
 
@@ -122,10 +124,12 @@ class Plan:
 
 
 def flights_over(
-    scenes: Sequence[Scene], flights: int, sensors: SensorPreset, seed: int
+    scenes: Sequence[Scene], flights: int, sensors: SensorPreset, seed: int, heaps: bool = False
 ) -> list[Flight]:
-    """Some flights over each scene, all with one seed."""
-    return [Flight(scene, seed, number, sensors) for scene in scenes for number in range(flights)]
+    """Some flights over each scene: all over one heap with one seed, or each over a heap of its
+    own with the next seed (`heaps`)."""
+    places = [(seed + number, 0) if heaps else (seed, number) for number in range(flights)]
+    return [Flight(scene, *place, sensors) for scene in scenes for place in places]
 
 
 def _has_places(flight: Flight) -> bool:
@@ -134,10 +138,10 @@ def _has_places(flight: Flight) -> bool:
 
 
 def _sequences(finished: Sequence[Finished]) -> int:
-    """Number of sequences, control scenes excluded."""
+    """Number of sequences, unscored scenes excluded."""
     total = 0
     for unit in finished:
         frame = unit.table.rows("localization", "error_m")
-        frame = frame[~frame["scene"].isin(CONTROL_SCENES)]
+        frame = frame[~frame["scene"].isin(UNSCORED_SCENES)]
         total += len(frame[SEQUENCE_KEYS].drop_duplicates())
     return total

@@ -32,7 +32,7 @@ def comparison_figures(helds: Sequence[Against]) -> Iterator[ReportFigure]:
     yield from _differences(helds)
     runs = [helds[0].reference, *(held.run for held in helds)]
     drawn = [
-        Drawn(run.measured.condition, run.table.without_controls(), _plain(run.name), colour)
+        Drawn(run.measured.condition, run.table.scored(), _plain(run.name), colour)
         for run, colour in zip(runs, SERIES, strict=False)
     ]
     yield from localization_figures(drawn)

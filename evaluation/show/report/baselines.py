@@ -29,7 +29,7 @@ HEADER = (
 def baseline_table(table: ResultTable) -> TextTable:
     """One row a baseline; no rows where none was tried (of one condition).
     Where control scenes were flown over too, a last column counts the claims there."""
-    measured, controls = table.without_controls(), table.controls()
+    measured, controls = table.scored(), table.controls()
     rows = [(baseline, _cells(measured, baseline)) for baseline in BASELINES]
     tried = [(baseline, cells) for baseline, cells in rows if cells]
     if len(controls) == 0 or len(controls) == len(table):

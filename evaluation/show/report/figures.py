@@ -58,7 +58,7 @@ def report_figures(
         yield from showcase_figures(showcase)
     drawn = _chosen(table, conditions)
     if conditions[0].poses != "oracle exact":
-        yield from trajectory_figures(drawn[0].table, conditions[0])
+        yield from trajectory_figures(table, [d.condition for d in drawn])
     yield from localization_figures(drawn)
     yield from calibration_figures(drawn[0].table, conditions[0])
     yield from refinement_figures(_distinct(drawn))
@@ -73,7 +73,7 @@ def _chosen(table: ResultTable, conditions: Sequence[Condition]) -> list[Drawn]:
     chosen = [primary, *ordered][:COMPARED]
     labels = short_labels(chosen)
     return [
-        Drawn(c, table.of(c).without_controls(), label, colour)
+        Drawn(c, table.of(c).scored(), label, colour)
         for c, label, colour in zip(chosen, labels, SERIES, strict=False)
     ]
 

@@ -23,6 +23,7 @@ from evaluation.show.report.calibration import calibration_table, claims_table
 from evaluation.show.report.error_budget import budget_table
 from evaluation.show.report.failures import control_table, failures
 from evaluation.show.report.figures import report_figures
+from evaluation.show.report.reproduction import reproduction_table
 from evaluation.show.report.screen import live_table
 from evaluation.show.report.tables import comparison_table, headlines, scene_table, timing_table
 from evaluation.show.report.trajectories import trajectory_table
@@ -64,13 +65,14 @@ def write_report(
     """
     shown = table.conditions()
     primary = table.of(shown[0])
-    measured = primary.without_controls()
+    measured = primary.scored()
     page = rendered(
         "report.html.j2",
         condition=shown[0].label(),
         scenes=measured.scenes(),
         run=run,
         headlines=headlines(measured),
+        reproduction=reproduction_table(table, shown),
         comparison=comparison_table(table, shown),
         shared=shared_parts(shown) if len(shown) > 1 else shown[0].label(),
         pictures=[saved_picture(f, out) for f in report_figures(table, shown, showcase)],

@@ -84,7 +84,7 @@ def _headline(metric: Metric, table: ResultTable) -> Headline | None:
 
 def comparison_table(table: ResultTable, conditions: Sequence[Condition]) -> TextTable:
     """Every condition beside the paper, a row per metric; rows without any value are left out."""
-    measured = [table.of(condition).without_controls() for condition in conditions]
+    measured = [table.of(condition).scored() for condition in conditions]
     header = ("", "paper (real robots)", *short_labels(conditions))
     rows = [
         (name, paper, *(cell(part) for part in measured)) for name, paper, cell in _COMPARED_ROWS

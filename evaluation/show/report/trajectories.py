@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,16 +19,25 @@ from evaluation.table.rows import ResultTable
 RUN_KEYS = ["scene", "seed", "flight"]
 
 
-def trajectory_figures(table: ResultTable, condition: Condition) -> Iterator[ReportFigure]:
-    """Fig. 9 and 10 of one condition: the median run and the worst, without control scenes."""
+def trajectory_figures(
+    table: ResultTable, conditions: Sequence[Condition]
+) -> Iterator[ReportFigure]:
+    """Fig. 9 and 10: of the first condition the median run and the worst, of others with poses of
+    their own the median run; unscored scenes are left out."""
     for number, robot, paper in (
         (9, "mav", published.MAV_RMSE_M),
         (10, "ground", published.GROUND_RMSE_M),
     ):
-        runs = _median_and_worst(table, robot)
+        primary = table.of(conditions[0]).scored()
+        runs = _median_and_worst(primary, robot)
         if not runs:
             continue
-        count = len(table.values("trajectory", f"{robot}_ate_se3_rmse_m"))
+        others = _beside(table, conditions, robot)
+        count = len(primary.values("trajectory", f"{robot}_ate_se3_rmse_m"))
+        beside = f" Beside it: {'; '.join(c.label() for c in others)}, median run." * bool(others)
+        for condition in others:
+            run = _median_and_worst(table.of(condition).scored(), robot)[0]
+            runs.append(replace(run, title=f"preset {condition.preset}, {run.title}"))
         yield ReportFigure(
             f"fig{number:02d}_{robot}_error",
             f"Fig. {number}: position error of the {ROBOTS[robot]} over time",
@@ -35,15 +45,28 @@ def trajectory_figures(table: ResultTable, condition: Condition) -> Iterator[Rep
             "trajectory (rotation and shift, by evo; scale is not corrected). Live: the pose "
             "estimated with each image; final: the pose after the last image. Grey: initializing "
             f"or lost. Median and worst of {count} run(s) by the RMS of the live poses; "
-            f"{condition.label()}. Dashed: the paper's RMS, {100 * paper.value:g} cm "
+            f"{conditions[0].label()}.{beside} Dashed: the paper's RMS, {100 * paper.value:g} cm "
             f"({paper.source}), real robot.",
             trajectory_error_figure(runs, paper.value),
         )
 
 
+def _beside(table: ResultTable, conditions: Sequence[Condition], robot: str) -> list[Condition]:
+    """Conditions with SLAM whose poses are not those of a condition before."""
+    metric = ("trajectory", f"{robot}_ate_se3_rmse_m")
+    known = [table.of(conditions[0]).values(*metric).tolist()]
+    found = []
+    for condition in conditions[1:]:
+        values = table.of(condition).values(*metric).tolist()
+        if condition.poses == "slam" and values and values not in known:
+            known.append(values)
+            found.append(condition)
+    return found
+
+
 def trajectory_table(table: ResultTable, conditions: Sequence[Condition]) -> TextTable:
     """Each condition's poses: median over the runs, the worst run below."""
-    parts = [table.of(condition).without_controls() for condition in conditions]
+    parts = [table.of(condition).scored() for condition in conditions]
     kept = [
         (label, part)
         for label, part in zip(short_labels(conditions), parts, strict=True)

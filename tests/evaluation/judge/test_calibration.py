@@ -143,7 +143,7 @@ def test_the_rank_correlation_tells_whether_the_spread_predicts_the_error() -> N
 
 
 def test_the_figure_shows_every_belief() -> None:
-    table = make_table(conditions=(BEST,)).without_controls()
+    table = make_table(conditions=(BEST,)).scored()
     found = localizations(table)
     (drawing,) = calibration_figures(table, BEST)
     right = drawing.figure.axes[1]

@@ -72,7 +72,7 @@ def test_every_case_is_counted_and_all_of_them_are_their_sum() -> None:
 
 
 def test_negatives_enter_no_success_rate() -> None:
-    assert len(TABLE.without_controls().sequences("error_m")) == 1
+    assert len(TABLE.scored().sequences("error_m")) == 1
     assert len(TABLE.trials()) == 3
 
 

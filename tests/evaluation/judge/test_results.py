@@ -54,7 +54,7 @@ def test_the_same_measurement_twice_is_refused() -> None:
 
 
 def test_trials_line_up_across_metrics() -> None:
-    trials = make_table(conditions=(BEST,)).without_controls().trials()
+    trials = make_table(conditions=(BEST,)).scored().trials()
     assert len(trials) == 3 * 2 * 12
     assert {"before_translation_m", "after_translation_m", "accepted"} <= set(trials.columns)
     assert trials.notna().all(axis=None)
@@ -70,9 +70,9 @@ def test_conditions_come_in_order_and_select_their_rows() -> None:
 
 def test_control_scenes_are_set_apart_unless_they_are_all_there_is() -> None:
     table = make_table(sequences=1, conditions=(BEST,))
-    assert table.without_controls().scenes() == list(SCENES)
+    assert table.scored().scenes() == list(SCENES)
     assert table.controls().scenes() == ["flat"]
-    assert table.controls().without_controls().scenes() == ["flat"]
+    assert table.controls().scored().scenes() == ["flat"]
 
 
 def test_short_labels_name_only_what_differs() -> None:

@@ -28,7 +28,7 @@ def test_every_key_of_the_contract_is_there(table: ResultTable, tmp_path: Path) 
     assert list(made) == [
         "schema", "version", "git_revision", "preset", "poses", "seed", "scenes", "machine",
         "slam", "surface", "localization", "refinement", "timing_ms",
-        "real_time_factor", "realtime", "claims", "calibration",
+        "real_time_factor", "realtime", "claims", "calibration", "reproduction",
     ]  # fmt: skip
     assert made["machine"] == {"cpu": "some processor", "cores": 2}
     promised = {"ate_sim3_rmse_m", "ate_se3_rmse_m", "scale_error", "tracked_fraction", "path_m"}

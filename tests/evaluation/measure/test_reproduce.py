@@ -62,7 +62,7 @@ def flown_for(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "measure", measure)
         found = plan.measured(None, None, None)  # type: ignore[arg-type]
-    frame = found.table.of(found.table.conditions()[0]).without_controls().sequences("error_m")
+    frame = found.table.of(found.table.conditions()[0]).scored().sequences("error_m")
     return flown, len(frame)
 
 

@@ -141,7 +141,7 @@ def _flight_medians(held: Against) -> list[float]:
     """Of the differences of surface errors [mm], by pandas."""
     columns = []
     for side in (held.reference, held.run):
-        rows = side.table.without_controls().rows("surface", "error_median_m")
+        rows = side.table.scored().rows("surface", "error_median_m")
         columns.append(rows.set_index(["seed", "trial"])["value"])
     differences: pd.Series = 1e3 * (columns[1] - columns[0])
     return differences.groupby("seed").median().tolist()

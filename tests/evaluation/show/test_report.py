@@ -20,14 +20,14 @@ from evaluation.show.report.page import write_report
 from evaluation.show.report.tables import comparison_table, headlines, scene_table, timing_table
 from evaluation.show.report.trajectories import trajectory_figures, trajectory_table
 from evaluation.table.rows import ResultTable, Row
-from tests.evaluation.synthetic_results import BEST, DRIFT, MINMAX, PAPER, SCENES, make_table
+from tests.evaluation.synthetic_results import BEST, DRIFT, LITERAL, PAPER, SCENES, make_table
 
 RUN = RunInfo("0.1.0", "abc1234", 7, "some <processor>", 2)
 
 
 @pytest.fixture(scope="module")
 def table() -> ResultTable:
-    return make_table(conditions=(BEST, PAPER, MINMAX))
+    return make_table(conditions=(BEST, LITERAL, PAPER))
 
 
 @pytest.fixture(scope="module")
@@ -92,10 +92,10 @@ def test_the_page_says_that_it_is_simulated_and_under_which_conditions(
 def test_the_comparison_has_a_column_for_the_paper_and_each_condition(table: ResultTable) -> None:
     made = comparison_table(table, table.conditions())
     assert made.header == ("", "paper (real robots)", "preset best", "preset paper",
-                           "preset paper (sigma of the scaled cost)")  # fmt: skip
+                           "preset paper_literal")  # fmt: skip
     assert {len(row) for row in made.rows} == {5}
     cells = {row[0]: row for row in made.rows}
-    errors = table.of(PAPER).without_controls().sequences("error_m")[4].to_numpy(float)
+    errors = table.of(LITERAL).scored().sequences("error_m")[4].to_numpy(float)
     good = int((errors <= 0.25).sum())
     assert f"{good} of {len(errors)};" in cells["within 0.25 m after 4 maps"][3]
     assert cells["refined, median"][1] == "76 mm, 3.0°"
@@ -139,7 +139,7 @@ def test_a_place_with_the_wrong_heading_is_not_a_pose() -> None:
 
 
 def test_every_failure_is_listed_with_its_reason(table: ResultTable) -> None:
-    part = table.of(PAPER).without_controls()
+    part = table.of(LITERAL).scored()
     made = failures(part)
     errors = part.sequences("error_m")[4].to_numpy(float)
     listed = [failure for failure in made if failure.kind == "sequence"]
@@ -150,11 +150,11 @@ def test_every_failure_is_listed_with_its_reason(table: ResultTable) -> None:
 
 def test_every_failure_leads_to_what_happened(table: ResultTable, page: tuple[Path, str]) -> None:
     _, html = page
-    listed = failures(table.of(BEST).without_controls())
+    listed = failures(table.of(BEST).scored())
     assert listed
     for failure in listed:
         assert html.count(failure.title) == 1
-    hopeless = failures(table.of(PAPER).without_controls())
+    hopeless = failures(table.of(LITERAL).scored())
     sequence = next(failure for failure in hopeless if failure.kind == "sequence")
     assert [row[0] for row in sequence.story.rows] == [str(n) for n in range(1, 13)]
     assert sequence.result.startswith(sequence.story.rows[3][1])
@@ -189,7 +189,7 @@ def test_the_control_scene_is_judged_by_what_it_claims(table: ResultTable) -> No
 
 
 def test_scenes_stand_side_by_side(table: ResultTable) -> None:
-    made = scene_table(table.of(BEST).without_controls())
+    made = scene_table(table.of(BEST).scored())
     assert [row[0] for row in made.rows] == list(SCENES)
 
 
@@ -200,7 +200,7 @@ def test_the_timing_table_says_what_was_not_run(table: ResultTable) -> None:
 
 
 def test_headlines_leave_out_what_was_not_measured(table: ResultTable) -> None:
-    measured = table.of(BEST).without_controls()
+    measured = table.of(BEST).scored()
     assert len(headlines(measured)) == 7
     only_timing = ResultTable(measured.frame[measured.frame["stage"] == "timing"])
     assert headlines(only_timing) == []
@@ -234,7 +234,7 @@ def test_poses_from_slam_get_figures_and_a_table_with_their_alignment() -> None:
                 time_s = tenth / 10
                 rows.append(Row(*where, "trajectory_error", metric, error, "m", time_s=time_s))
     table = ResultTable.from_rows(rows)
-    (figure,) = trajectory_figures(table, condition)
+    (figure,) = trajectory_figures(table, [condition])
     assert figure.name == "fig09_mav_error"
     titles = [axes.get_title(loc="left") for axes in figure.figure.axes]
     assert titles == [
