@@ -11,7 +11,8 @@ INTRODUCTION = """\
 # Parameters
 
 Every parameter of the pipeline, made from [`config.py`](../airground/config.py) by `make docs`; a
-test sees that it is up to date. `best` is the default; `paper` has the constants as published.
+test sees that it is up to date. `best` is the default; `paper` has the constants as published,
+and `paper_literal` the same with `localization.sigma` as printed, 0.08 m^2.
 A dash there means the same as `best`. [The method](method.md) says what the important ones do.
 
 ```

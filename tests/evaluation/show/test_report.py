@@ -91,8 +91,8 @@ def test_the_page_says_that_it_is_simulated_and_under_which_conditions(
 
 def test_the_comparison_has_a_column_for_the_paper_and_each_condition(table: ResultTable) -> None:
     made = comparison_table(table, table.conditions())
-    assert made.header == ("", "paper (real robots)", "preset best", "preset paper",
-                           "preset paper_literal")  # fmt: skip
+    assert made.header == ("", "paper (real robots)", "preset best", "preset paper_literal",
+                           "preset paper")  # fmt: skip
     assert {len(row) for row in made.rows} == {5}
     cells = {row[0]: row for row in made.rows}
     errors = table.of(LITERAL).scored().sequences("error_m")[4].to_numpy(float)
