@@ -1,31 +1,24 @@
 """A pytest plugin for .ci/run: slow tests that passed with the same sources do not run again.
 
 `PASSED_BEFORE=FOLDER pytest -p tests.passed_before`. The folder has an empty file for each test
-that passed, named by a digest of the test and of all it may depend on: the sources that its file
-imports, directly or not, all data files, and the locked libraries. Where imports do not show what
-runs (another process, an import by name), it depends on all sources.
+that passed, named by a digest of the test and of all it depends on (`tests.behind`).
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-import re
 from collections.abc import Generator
 from functools import cache
 from pathlib import Path
 
 import pytest
 
-from tests.sources import ROOMS, ROOT, imports, sources
+from tests.behind import digest, files_behind, files_of_subject
 
 FOLDER = Path(os.environ["PASSED_BEFORE"])
 MARKS = pytest.StashKey[dict[str, Path]]()
 """The file of each slow test that exists once the test has passed."""
-BY_NAME = {"importlib", "importlib.import_module", "pkgutil", "runpy"}
-"""Imports with which a file can run code that it does not import."""
-IN_TESTS = BY_NAME | {"subprocess"}
-"""Likewise in tests, which start Python processes; other code starts only foreign programs."""
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -60,69 +53,22 @@ def pytest_runtest_makereport(
 
 def mark(item: pytest.Item) -> Path:
     """The file that says that a test passed with the present sources."""
-    file = item.nodeid.partition("::")[0]
-    subject = item.get_closest_marker("subject")
-    files = files_behind(file) if subject is None else (file, *subject.args)
     found = hashlib.sha256(item.nodeid.encode())
-    for file in files:
+    for file in files(item):
         found.update(file.encode() + b"\0" + digest(file))
     return FOLDER / found.hexdigest()
 
 
-@cache
-def files_behind(test_file: str) -> tuple[str, ...]:
-    """All that the tests of a file may depend on."""
-    files = {*python_behind(test_file), *data_files(), *pages_behind(test_file)}
-    return tuple(sorted(files))
+def files(item: pytest.Item) -> tuple[str, ...]:
+    """What a test depends on, in order."""
+    test_file = item.nodeid.partition("::")[0]
+    subject = item.get_closest_marker("subject")
+    if subject is None:
+        return _files_behind(test_file)
+    but = subject.kwargs.get("but", {})
+    return tuple(sorted(files_of_subject(test_file, subject.args, but)))
 
 
 @cache
-def digest(file: str) -> bytes:
-    return hashlib.sha256((ROOT / file).read_bytes()).digest()
-
-
-def python_behind(test_file: str) -> set[str]:
-    """The test's file, its conftests, and what they import; all sources where that is unknown."""
-    parents = [str(folder / "conftest.py") for folder in Path(test_file).parents]
-    waiting = [test_file, *(file for file in parents if (ROOT / file).exists())]
-    found: set[str] = set()
-    while waiting:
-        file = waiting.pop()
-        if file in found:
-            continue
-        found.add(file)
-        names = imports(file)
-        hiding = IN_TESTS if file.startswith("tests/") else BY_NAME
-        if any(
-            name in hiding or name.partition(".")[0] in hiding - {"importlib"} for name in names
-        ):
-            return {*sources(*ROOMS, "tests"), *found}
-        for name in names:
-            parts = name.split(".")
-            if parts[0] in (*ROOMS, "tests"):
-                paths = [Path(*parts[:count]) for count in range(1, len(parts) + 1)]
-                modules = [str(p) for path in paths for p in (path / "__init__.py", f"{path}.py")]
-                waiting += [module for module in modules if (ROOT / module).is_file()]
-    return found
-
-
-@cache
-def data_files() -> tuple[str, ...]:
-    """Files other than Python that programs read, and the locked libraries."""
-    files = [
-        file for folder in (*ROOMS, "scenes", "tests") for file in (ROOT / folder).rglob("*.*")
-    ]
-    kept = [
-        str(file.relative_to(ROOT))
-        for file in files
-        if file.is_file() and file.suffix != ".py" and file.parent.name != "__pycache__"
-    ]
-    return (*kept, "pyproject.toml", "requirements.lock")
-
-
-def pages_behind(test_file: str) -> list[str]:
-    """The pages, for tests that run what they show."""
-    text = (ROOT / test_file).read_text(encoding="utf-8")
-    if not re.search("docs|README", text):
-        return []
-    return ["README.md", *(str(page.relative_to(ROOT)) for page in (ROOT / "docs").glob("*.md"))]
+def _files_behind(test_file: str) -> tuple[str, ...]:
+    return tuple(sorted(files_behind(test_file)))

@@ -17,6 +17,7 @@ ROOT = Path(__file__).parent.parent
 
 
 @pytest.mark.slow
+@pytest.mark.subject("tests/digest_of_results.py")
 def test_kernels_from_the_cache_round_as_they_did_when_compiled(tmp_path: Path) -> None:
     words = [sys.executable, "-m", "tests.digest_of_results"]
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}

@@ -30,6 +30,16 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
+@pytest.mark.subject(
+    "pyproject.toml",
+    "README.md",
+    "LICENSE",
+    "scenes",
+    "sim/scene.py",
+    "evaluation/cli.py",
+    "evaluation/show/report",
+    "evaluation/accepted.json",
+)
 def test_the_wheel_holds_what_it_needs_and_no_more(wheel: Path) -> None:
     names = zipfile.ZipFile(wheel).namelist()
     rooms = {name.partition("/")[0] for name in names if ".dist-info/" not in name}
@@ -40,6 +50,16 @@ def test_the_wheel_holds_what_it_needs_and_no_more(wheel: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.subject(
+    "pyproject.toml",
+    "README.md",
+    "LICENSE",
+    "scenes",
+    "sim/scene.py",
+    "evaluation/cli.py",
+    "evaluation/show/report",
+    "evaluation/accepted.json",
+)
 def test_the_wheel_works_outside_the_checkout(wheel: Path, tmp_path: Path) -> None:
     environment = tmp_path / "venv"
     venv.create(environment, with_pip=False)

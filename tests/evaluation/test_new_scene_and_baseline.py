@@ -64,6 +64,7 @@ def with_line(table: str) -> str:
 
 
 @pytest.mark.slow
+@pytest.mark.subject(but={"airground/slam": "poses are the true ones"})
 def test_the_baseline_answers_over_the_scene(copy: Path) -> None:
     command = "from evaluation.cli import main; main()"
     words = "reproduce --scenes small.toml --flights 1 --alone --poses oracle --out heap"

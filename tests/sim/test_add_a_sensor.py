@@ -37,6 +37,7 @@ def names_after(example: str, folder: Path) -> dict[str, Any]:
 
 
 @pytest.mark.slow
+@pytest.mark.subject("docs/add_a_sensor.md", "sim", "airground/core", "airground/io")
 def test_a_recording_is_made_with_the_preset(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

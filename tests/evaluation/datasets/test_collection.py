@@ -168,6 +168,17 @@ def test_words_without_a_meaning_are_refused(
 
 
 @pytest.mark.slow
+@pytest.mark.subject(
+    "evaluation/cli.py",
+    "evaluation/commands/data.py",
+    "evaluation/datasets",
+    "evaluation/measure/work",
+    "evaluation/setup",
+    "sim",
+    "airground/core",
+    "airground/errors.py",
+    "airground/io",
+)
 def test_a_killed_dataset_is_finished_by_the_next_call(tmp_path: Path) -> None:
     """SIGKILL at any time leaves whole recordings only, and the same bytes in the end."""
     scene = tmp_path / "small.toml"

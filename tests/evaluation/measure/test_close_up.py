@@ -142,6 +142,25 @@ def test_a_run_that_located_nothing_keeps_nothing() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.subject(
+    "evaluation/measure/close_up.py",
+    "evaluation/measure/showcase.py",
+    "evaluation/run/onlooker.py",
+    "evaluation/setup",
+    "evaluation/show/figures",
+    "evaluation/table",
+    "airground/augmentation.py",
+    "airground/config.py",
+    "airground/core",
+    "airground/slam/front_end.py",
+    "airground/tracking.py",
+    but={
+        "airground/io": "the recording is made up",
+        "sim": "so is the truth",
+        "evaluation/cli.py": "for another test",
+        "evaluation/show/rerun_view": "for another test",
+    },
+)
 def test_it_survives_a_folder_and_is_drawn(kept: Showcase, tmp_path: Path) -> None:
     kept.save(tmp_path / "showcase")
     drawn = list(showcase_figures(Showcase.load(tmp_path / "showcase")))

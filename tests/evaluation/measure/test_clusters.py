@@ -59,6 +59,7 @@ def test_a_running_scheduler_is_used_and_not_stopped(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.subject("evaluation/measure/work", "evaluation/setup", "airground/errors.py")
 def test_a_cluster_that_stops_is_an_error(tmp_path: Path) -> None:
     with scheduler(tmp_path) as address, Crew(address, 1, 2, tmp_path) as crew:
         outcomes = crew.outcomes(nap, [0.0, 600.0])
@@ -70,6 +71,7 @@ def test_a_cluster_that_stops_is_an_error(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.subject("evaluation/measure/work", "evaluation/setup", "airground/errors.py")
 @pytest.mark.parametrize(
     ("threads", "daemon", "message"),
     [(2, False, "--nthreads 1"), (1, True, "DASK_DISTRIBUTED__WORKER__DAEMON=False")],
@@ -125,6 +127,7 @@ def test_an_invalid_file_is_an_error(old: str, new: str, message: str, tmp_path:
 
 
 @pytest.mark.slow
+@pytest.mark.subject("evaluation/measure/work", "evaluation/setup", "airground/errors.py")
 def test_jobs_run_tasks(tmp_path: Path) -> None:
     pytest.importorskip("dask_jobqueue")
     file = tmp_path / "local.yaml"

@@ -58,6 +58,13 @@ def test_a_flight_is_measured_once_for_all_its_variants(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.subject(
+    "evaluation/measure/work",
+    "evaluation/setup",
+    "evaluation/table",
+    "airground/errors.py",
+    but={"airground/config.py": "units are made up", "evaluation/measure/protocol": "likewise"},
+)
 def test_results_do_not_depend_on_the_number_of_workers(tmp_path: Path) -> None:
     units = fake_units(tmp_path / "flights", 5)
     made = {
@@ -75,6 +82,13 @@ def test_results_do_not_depend_on_the_number_of_workers(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.subject(
+    "evaluation/measure/work",
+    "evaluation/setup",
+    "evaluation/table",
+    "airground/errors.py",
+    but={"airground/config.py": "units are made up", "evaluation/measure/protocol": "likewise"},
+)
 def test_a_task_that_kills_every_worker_is_an_error(tmp_path: Path) -> None:
     units = fake_units(tmp_path / "flights", 1)
     (tmp_path / "flights/flight_0" / DIE).touch()
@@ -134,6 +148,13 @@ def test_a_full_disk_leaves_complete_units_only(
 
 
 @pytest.mark.slow
+@pytest.mark.subject(
+    "evaluation/measure/work",
+    "evaluation/setup",
+    "evaluation/table",
+    "airground/errors.py",
+    but={"airground/config.py": "units are made up", "evaluation/measure/protocol": "likewise"},
+)
 def test_a_killed_run_is_continued(tmp_path: Path) -> None:
     out, flights = tmp_path / "out", tmp_path / "flights"
     command = [sys.executable, "-m", "tests.evaluation.measure.killed_run"]

@@ -42,6 +42,7 @@ def values(table: ResultTable, stage: str, number: int | None = None) -> list[tu
 
 
 @pytest.mark.slow
+@pytest.mark.subject(but={"airground/slam": "both runs have the same"})
 def test_run_and_protocol_give_the_same_numbers(path: Path) -> None:
     setup = Setup(Config())
     protocol = Protocol(sequences=2, trials=1, sequence_length=LENGTH)
@@ -60,6 +61,7 @@ def test_run_and_protocol_give_the_same_numbers(path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.subject(but={"airground/slam": "both runs have the same"})
 def test_setups_that_share_maps_give_the_results_of_a_pass_of_their_own(path: Path) -> None:
     recording, truth = Recording.open(path), Truth.open(path)
     few = Setup(with_localization(Config(), particles=50))

@@ -54,6 +54,16 @@ def results(out: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.slow
+@pytest.mark.subject(
+    "evaluation/cli.py",
+    "evaluation/commands",
+    "evaluation/setup",
+    "evaluation/table",
+    "evaluation/measure",
+    "evaluation/judge/sweep.py",
+    "evaluation/show/sweep_results.py",
+    but={"airground": "what is measured does not matter to what is kept", "sim": "likewise"},
+)
 def test_a_killed_sweep_ends_with_the_results_of_an_untouched_one(tmp_path: Path) -> None:
     untouched = start(tmp_path / "untouched", threads=2)
     assert untouched.wait() == 0

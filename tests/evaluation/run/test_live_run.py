@@ -31,7 +31,10 @@ from sim.recording.truth import Truth
 from tests.io.recordings import HEIGHT, UNITS_PER_M, WIDTH, calibration, write_recording
 from tests.sim.flights import simulate, small_scene
 
-pytestmark = pytest.mark.slow
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.subject(but={"airground/slam": "poses are the true ones"}),
+]
 
 SETUP = Setup(Config(ground_mapping=GroundMapping(min_keyframes=1)), "oracle")
 PATIENCE_S = 60.0

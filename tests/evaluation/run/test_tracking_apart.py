@@ -107,6 +107,7 @@ def test_frames_can_be_kept(small: Path, monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 @pytest.mark.slow
+@pytest.mark.subject(but={"airground/slam": "the process dies or fails whatever it tracks"})
 def test_an_unreadable_image_raises_the_same_error(small: Path, tmp_path: Path) -> None:
     broken = tmp_path / "broken"
     shutil.copytree(small, broken)
@@ -122,6 +123,7 @@ def test_an_unreadable_image_raises_the_same_error(small: Path, tmp_path: Path) 
 
 
 @pytest.mark.slow
+@pytest.mark.subject(but={"airground/slam": "the process dies or fails whatever it tracks"})
 @pytest.mark.parametrize("robot", [0, 1])
 def test_a_death_raises_an_error_and_all_processes_end_with_the_block(
     small: Path, robot: int, monkeypatch: pytest.MonkeyPatch

@@ -18,6 +18,7 @@ from tests.evaluation.synthetic_results import BEST, PAPER, make_showcase, make_
 
 pytestmark = [
     pytest.mark.slow,
+    pytest.mark.subject(but={"airground/slam": "results are made up", "sim": "likewise"}),
     pytest.mark.skipif(program() is None, reason="no chromium (scripts/install_chromium)"),
 ]
 
