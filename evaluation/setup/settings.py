@@ -26,6 +26,10 @@ class OracleErrors(Section):
     """RMS of the MAV's slow position error after alignment [cm]; the paper measured 1.2."""
     drift_ground_cm: Annotated[float, Field(ge=0, le=100)] = 0.0
     """RMS of the ground robot's drift after alignment [cm]; the paper measured 3.8."""
+    drift_mav_deg: Annotated[float, Field(ge=0, le=45)] = 0.0
+    """RMS of the MAV's slow orientation error since its first image [deg]."""
+    drift_ground_deg: Annotated[float, Field(ge=0, le=45)] = 0.0
+    """RMS of the ground robot's orientation drift since its first image [deg]."""
     noise_mm: Annotated[float, Field(ge=0, le=1000)] = 0.0
     """White position noise per axis and frame [mm]."""
     noise_deg: Annotated[float, Field(ge=0, le=45)] = 0.0
@@ -36,6 +40,8 @@ class OracleErrors(Section):
         return PoseNoise(
             drift_mav_m=self.drift_mav_cm / 100,
             drift_ground_m=self.drift_ground_cm / 100,
+            drift_mav_deg=self.drift_mav_deg,
+            drift_ground_deg=self.drift_ground_deg,
             white_m=self.noise_mm / 1000,
             white_deg=self.noise_deg,
         )

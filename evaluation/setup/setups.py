@@ -18,12 +18,16 @@ class PoseNoise:
     Attributes:
         drift_mav_m: RMS of the MAV's slow position error after SE3 alignment [m].
         drift_ground_m: RMS of the ground robot's drift after SE3 alignment [m].
+        drift_mav_deg: RMS of the MAV's slow orientation error since the first image [deg].
+        drift_ground_deg: RMS of the ground robot's orientation drift since the first image [deg].
         white_m: Standard deviation of independent position noise per axis and frame [m].
         white_deg: The same of the orientation, per axis [deg].
     """
 
     drift_mav_m: float = 0.0
     drift_ground_m: float = 0.0
+    drift_mav_deg: float = 0.0
+    drift_ground_deg: float = 0.0
     white_m: float = 0.0
     white_deg: float = 0.0
 

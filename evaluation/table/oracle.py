@@ -38,6 +38,7 @@ class Oracle:
         T_world_camera: True pose at a stamp [ns].
         stamps_ns: (N,) stamps of all images that will be asked for.
         drift: (N, 3) position error at each of them, in the map's axes [m].
+        turn: (N, 3) orientation error at each of them, axis times angle in the map's axes [rad].
         noise: White noise to add.
         rng: Draws the white noise.
     """
@@ -47,11 +48,15 @@ class Oracle:
         T_world_camera: Callable[[int], SE3],
         stamps_ns: NDArray[np.int64],
         drift: NDArray[np.float64],
+        turn: NDArray[np.float64],
         noise: PoseNoise,
         rng: np.random.Generator,
     ) -> None:
         self._T_world_camera = T_world_camera
-        self._drift = {int(stamp): error for stamp, error in zip(stamps_ns, drift, strict=True)}
+        self._errors = {
+            int(stamp): SE3.from_rotation_vector(turned, shifted)
+            for stamp, turned, shifted in zip(stamps_ns, turn, drift, strict=True)
+        }
         self._noise = noise
         self._rng = rng
         start = T_world_camera(int(stamps_ns[0]))
@@ -66,9 +71,10 @@ class Oracle:
     def track(self, image: MavImage | GroundImage) -> TrackedPose:
         """The true pose of this image plus the stated errors."""
         T = self._T_map_world @ self._T_world_camera(image.stamp_ns)
-        error = self._drift[image.stamp_ns] + self._rng.normal(0, self._noise.white_m, 3)
+        slow = self._errors[image.stamp_ns]
+        shift = slow.translation + self._rng.normal(0, self._noise.white_m, 3)
         turn = SE3.from_rotation_vector(self._rng.normal(0, np.deg2rad(self._noise.white_deg), 3))
-        T = SE3(T.rotation, T.translation + error) @ turn
+        T = SE3(slow.rotation @ T.rotation, T.translation + shift) @ turn
         self._tracked.append((image.stamp_ns, T))
         return TrackedPose(image.stamp_ns, Tracking.TRACKED, T)
 
@@ -95,9 +101,16 @@ def oracle_front_ends(
     ground_drift = _scaled(
         _random_walk(ground_stamps, ground_path, ground_rng), ground_path, noise.drift_ground_m
     )
+    # From generators of their own: positions do not depend on them.
+    mav_turn = _turn(_wander(mav_stamps, mav_rng.spawn(1)[0]), noise.drift_mav_deg)
+    ground_turn = _turn(
+        _random_walk(ground_stamps, ground_path, ground_rng.spawn(1)[0]), noise.drift_ground_deg
+    )
     return FrontEnds(
-        mav=Oracle(truth.T_world_mav_camera, mav_stamps, mav_drift, noise, mav_rng),
-        ground=Oracle(truth.T_world_ground_camera, ground_stamps, ground_drift, noise, ground_rng),
+        Oracle(truth.T_world_mav_camera, mav_stamps, mav_drift, mav_turn, noise, mav_rng),
+        Oracle(
+            truth.T_world_ground_camera, ground_stamps, ground_drift, ground_turn, noise, ground_rng
+        ),
     )
 
 
@@ -128,3 +141,11 @@ def _scaled(error: NDArray, path: NDArray, rms_m: float) -> NDArray[np.float64]:
     rotation, translation, _ = umeyama_alignment((path + error).T, path.T, with_scale=False)
     residual = (path + error) @ rotation.T + translation - path
     return error * (rms_m / np.sqrt((residual**2).sum(axis=1).mean()))
+
+
+def _turn(error: NDArray, rms_deg: float) -> NDArray[np.float64]:
+    """`error` as rotation vectors [rad], scaled to this RMS angle; the first pose stays exact."""
+    if rms_deg == 0.0:
+        return np.zeros_like(error)
+    error = error - error[0]
+    return error * (np.deg2rad(rms_deg) / np.sqrt((error**2).sum(axis=1).mean()))

@@ -1,5 +1,6 @@
 """An oracle is exact without noise, and off by the stated noise with it."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -75,6 +76,21 @@ def test_drift_is_smooth() -> None:
     poses, exact = (tracked(front_ends(n).ground) for n in (PAPER_DRIFT, PoseNoise()))
     error = np.array([a.translation - b.translation for a, b in zip(poses, exact, strict=True)])
     assert np.linalg.norm(np.diff(error, axis=0), axis=1).max() < 0.005
+
+
+def test_orientation_drift_has_the_stated_rms_and_leaves_positions_alone() -> None:
+    turned = replace(PAPER_DRIFT, drift_mav_deg=2.0, drift_ground_deg=1.0)
+    for robot, rms_deg in (("mav", 2.0), ("ground", 1.0)):
+        poses, straight = (
+            tracked(getattr(front_ends(noise), robot)) for noise in (turned, PAPER_DRIFT)
+        )
+        for a, b in zip(poses, straight, strict=True):
+            assert np.array_equal(a.translation, b.translation)
+        turns = [a.rotation @ b.rotation.T for a, b in zip(poses, straight, strict=True)]
+        angles_deg = np.rad2deg([SE3(turn, np.zeros(3)).angle() for turn in turns])
+        assert angles_deg[0] == pytest.approx(0, abs=1e-5)
+        assert np.abs(np.diff(angles_deg)).max() < 0.1  # smooth
+        assert np.sqrt((angles_deg**2).mean()) == pytest.approx(rms_deg, rel=1e-3)
 
 
 def test_white_noise_has_the_stated_size() -> None:
