@@ -9,7 +9,7 @@ PYTEST := $(PYTHON_IN_VENV) -m pytest -q --numprocesses=$(shell nproc) --maxproc
 
 demo: $(READY)
 	rm -rf $(OUT)
-	.venv/bin/airground reproduce --quick --out $(OUT)
+	.venv/bin/airground reproduce --quick --out $(OUT) $(if $(RECORDINGS),--recordings $(RECORDINGS))
 
 setup: $(READY)
 
@@ -22,10 +22,10 @@ test: $(READY)
 	$(PYTEST) -m "not slow"
 
 test-slow: $(READY)
-	$(PYTEST) -m slow --durations=10
+	$(PYTEST) --no-loadscope-reorder -m slow --durations=10
 
 test-all: $(READY)
-	$(PYTEST) --durations=10
+	$(PYTEST) --no-loadscope-reorder --durations=10
 
 # Kernels against their slow twins, as plain Python.
 test-uncompiled: $(READY)

@@ -16,7 +16,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 
 
-@pytest.mark.slow
+@pytest.mark.slow(minutes=1)
 @pytest.mark.subject("tests/digest_of_results.py")
 def test_kernels_from_the_cache_round_as_they_did_when_compiled(tmp_path: Path) -> None:
     words = [sys.executable, "-m", "tests.digest_of_results"]

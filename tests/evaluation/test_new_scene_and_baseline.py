@@ -63,7 +63,7 @@ def with_line(table: str) -> str:
     return table.replace(head, f"{imported}{head}{added}")
 
 
-@pytest.mark.slow
+@pytest.mark.slow(minutes=1)
 @pytest.mark.subject(but={"airground/slam": "poses are the true ones"})
 def test_the_baseline_answers_over_the_scene(copy: Path) -> None:
     command = "from evaluation.cli import main; main()"

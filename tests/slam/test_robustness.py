@@ -239,7 +239,7 @@ def test_a_yaw_of_20_deg_per_s(robot: Source, speed_mps: float) -> None:
     assert set(states(tracked, began)) == {TRACKED}
 
 
-@pytest.mark.slow
+@pytest.mark.slow(minutes=1)
 @both_robots
 @pytest.mark.parametrize("sway", [0.0, 0.1])
 def test_standing_still_for_10_s(robot: Source, sway: float) -> None:

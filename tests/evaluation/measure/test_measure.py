@@ -147,7 +147,7 @@ def test_a_full_disk_leaves_complete_units_only(
     assert runs(tmp_path / "flights")[:2] == [1, 2]
 
 
-@pytest.mark.slow
+@pytest.mark.slow(minutes=1)
 @pytest.mark.subject(
     "evaluation/measure/work",
     "evaluation/setup",

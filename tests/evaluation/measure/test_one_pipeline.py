@@ -41,7 +41,7 @@ def values(table: ResultTable, stage: str, number: int | None = None) -> list[tu
     return [tuple(map(str, row)) for row in frame[keys].itertuples(index=False)]
 
 
-@pytest.mark.slow
+@pytest.mark.slow(minutes=1)
 @pytest.mark.subject(but={"airground/slam": "both runs have the same"})
 def test_run_and_protocol_give_the_same_numbers(path: Path) -> None:
     setup = Setup(Config())

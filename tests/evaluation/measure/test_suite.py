@@ -65,7 +65,7 @@ def test_a_suite_can_say_something_and_has_a_control(name: str) -> None:
     assert CONTROL_SCENES & counts.keys()
 
 
-@pytest.mark.slow
+@pytest.mark.slow(minutes=1)
 @pytest.mark.subject(but={"airground/slam": "poses are the true ones"})
 def test_a_flight_is_recorded_once_and_measured_alike(tmp_path: Path) -> None:
     one = Suite((Flights("tiny", 1, 16.0),), Protocol(sequences=1, trials=2, sequence_length=4))

@@ -53,7 +53,7 @@ def results(out: Path) -> dict[str, bytes]:
     }
 
 
-@pytest.mark.slow
+@pytest.mark.slow(minutes=3)
 @pytest.mark.subject(
     "evaluation/cli.py",
     "evaluation/commands",

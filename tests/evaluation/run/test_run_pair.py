@@ -254,7 +254,7 @@ def test_poses_from_a_file_do_not_count_as_slam() -> None:
     assert setup.given.describe() == "MAV poses from a file"
 
 
-@pytest.mark.slow
+@pytest.mark.slow(minutes=2)
 @pytest.mark.subject(but={"airground/slam": "both runs have the same"})
 def test_a_round_trip_gives_the_same_result(tmp_path: Path) -> None:
     """Exported, imported and run: the map and the paths of the native run, to the last byte."""
