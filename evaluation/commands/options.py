@@ -172,13 +172,16 @@ class PipelineOptions(ConfigOptions):
         Raises:
             InputError: A parameter is out of its range, or errors are given for poses of SLAM.
         """
-        from evaluation.setup.setups import EXACT, Setup
+        from evaluation.setup.setups import EXACT, Reference, Setup
 
         settings = self.settings(self.north)
         noise = settings.oracle.noise()
         if self.poses == "slam" and noise != EXACT:
             raise InputError("section oracle adds errors to true poses; give --poses oracle")
-        return Setup(settings.pipeline(), self.poses, noise)
+        reference = settings.reference.reference()
+        if reference.by == "paths" and reference != Reference("paths"):
+            raise InputError("reference.by=paths uses no calibration of cameras: give no errors")
+        return Setup(settings.pipeline(), self.poses, noise, reference=reference)
 
 
 def in_range(word: str, value: float, low: float = 0.0, high: float = math.inf) -> float:

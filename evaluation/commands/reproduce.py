@@ -94,7 +94,7 @@ class Reproduce(
     much is measured on each flight (docs/parameters.md).
     """
 
-    sections: ClassVar[tuple[str, ...]] = ("oracle", "protocol")
+    sections: ClassVar[tuple[str, ...]] = ("oracle", "reference", "protocol")
 
     quick: Annotated[bool, _SMALLER] = False
     """one small scene and a short flight: minutes instead of hours"""

@@ -39,7 +39,7 @@ class Sweep(SensorOption, SeedOption, PipelineOptions, ResumableOutOption, Clust
     of the configuration says how much is measured on each flight (docs/parameters.md).
     """
 
-    sections: ClassVar[tuple[str, ...]] = ("oracle", "protocol")
+    sections: ClassVar[tuple[str, ...]] = ("oracle", "reference", "protocol")
 
     vary: Annotated[UseAppendAction[tuple[str, ...]], Shown("NAME=VALUE,VALUE,...")] = ()
     """dial (docs/sweep.md) or parameter, with values; repeatable"""

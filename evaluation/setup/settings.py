@@ -12,7 +12,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from airground.config import PRESETS, Config, Section
 from airground.errors import ConfigError
-from evaluation.setup.setups import PoseNoise
+from evaluation.setup.setups import PoseNoise, Reference
 
 DEFAULT_PRESET = "best"
 
@@ -47,6 +47,23 @@ class OracleErrors(Section):
         )
 
 
+class TrialReference(Section):
+    """What the poses of refinement trials are compared with."""
+
+    by: Literal["cameras", "paths"] = "cameras"
+    """The true poses of both cameras, or alignments of both estimated paths with the true ones by
+    positions alone, as by motion capture whose bodies are not calibrated against the cameras."""
+    mav_camera_deg: Annotated[float, Field(ge=0, le=45)] = 0.0
+    """Error of the calibration of the MAV's camera in its tracked body, per axis, constant over a
+    flight [deg]."""
+    ground_camera_deg: Annotated[float, Field(ge=0, le=45)] = 0.0
+    """The same of the ground robot's camera [deg]."""
+
+    def reference(self) -> Reference:
+        """The same, as a part of a setup."""
+        return Reference(self.by, self.mav_camera_deg, self.ground_camera_deg)
+
+
 class ProtocolCounts(Section):
     """Amount measured on each flight, by `reproduce` and `sweep`; None for the verb's default."""
 
@@ -72,6 +89,7 @@ class Settings(Config):
     """The pipeline's configuration, and the sections that only the evaluator reads."""
 
     oracle: OracleErrors = OracleErrors()
+    reference: TrialReference = TrialReference()
     protocol: ProtocolCounts = ProtocolCounts()
     rerun: RerunDetail = RerunDetail()
 

@@ -37,6 +37,34 @@ PAPER_DRIFT = PoseNoise(drift_mav_m=0.012, drift_ground_m=0.038)
 """What the paper measured for its SLAM (Fig. 9, 10)."""
 
 
+@dataclass(frozen=True)
+class Reference:
+    """What the poses of refinement trials are compared with.
+
+    Attributes:
+        by: "cameras": the true poses of both cameras. "paths": the rigid alignments of both
+            estimated paths with the true ones, by positions alone.
+        mav_camera_deg, ground_camera_deg: With "cameras": standard deviation per axis of an error
+            of each camera's orientation in the tracked body, drawn once per flight [deg].
+    """
+
+    by: Literal["cameras", "paths"] = "cameras"
+    mav_camera_deg: float = 0.0
+    ground_camera_deg: float = 0.0
+
+    def describe(self) -> str:
+        """How results name it; empty for the true poses."""
+        if self.by == "paths":
+            return "refinement against aligned paths"
+        if self == TRUE_POSES:
+            return ""
+        sizes = f"{self.mav_camera_deg:g} and {self.ground_camera_deg:g} deg"
+        return f"refinement against cameras turned by {sizes} (MAV, ground)"
+
+
+TRUE_POSES = Reference()
+
+
 @dataclass(frozen=True, eq=False)
 class Given:
     """Results of other systems; None where ours do the work.
@@ -83,6 +111,7 @@ class Setup:
         noise: What was added to the oracle's poses.
         variant: What else differs from the preset, in words.
         given: What the user brings along in place of a stage.
+        reference: What the poses of refinement trials are compared with.
     """
 
     config: Config
@@ -90,6 +119,7 @@ class Setup:
     noise: PoseNoise = EXACT
     variant: str = ""
     given: Given = NOTHING
+    reference: Reference = TRUE_POSES
 
     def front_ends(self) -> dict[str, FrontEndName]:
         """The front end of "mav" and of "ground"."""
@@ -116,7 +146,7 @@ class Setup:
             poses=poses,
             sensors=sensors,
             heading=self.config.localization.heading,
-            variant=self.variant,
+            variant=", ".join(filter(None, (self.variant, self.reference.describe()))),
         )
 
     def maps_like(self, other: Setup) -> bool:

@@ -53,8 +53,13 @@ def true_T_ground_mav(poses: BothPoses, truth: Truth) -> SE3:
 
 def pose_error(T_ground_mav: SE3, poses: BothPoses, truth: Truth) -> PoseError:
     """How far an estimate puts the MAV's camera from where it is."""
-    true = true_T_ground_mav(poses, truth) @ poses.T_mav_camera
-    estimate = T_ground_mav @ poses.T_mav_camera
+    return relative_error(T_ground_mav, true_T_ground_mav(poses, truth), poses.T_mav_camera)
+
+
+def relative_error(T_ground_mav: SE3, reference: SE3, T_mav_camera: SE3) -> PoseError:
+    """How far two relations between the maps put the MAV's camera apart."""
+    true = reference @ T_mav_camera
+    estimate = T_ground_mav @ T_mav_camera
     off = estimate.translation - true.translation
     return PoseError(
         float(np.linalg.norm(off[:2])),

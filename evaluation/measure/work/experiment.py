@@ -40,6 +40,7 @@ from evaluation.measure.work.unit import Finished, Unit
 from evaluation.run.onlooker import STAGE_OF
 from evaluation.run.tracking import localizer_rng
 from evaluation.setup.memory import peak_memory_mib
+from evaluation.table.reference import reference_of
 from evaluation.table.row_writer import RowWriter
 from evaluation.table.rows import ALIGNMENT_STAGE, ResultTable
 from evaluation.table.tracking_quality import add_tracking
@@ -195,8 +196,17 @@ def _add_sequences(
 
 def _add_trials(out: RowWriter, unit: Unit, maps: Maps, truth: Truth) -> None:
     chosen = trial_sightings(len(maps.sightings), unit.protocol.trials)
+    if not chosen:
+        return
+    reference = reference_of(
+        unit.setup.reference,
+        {robot: tracked.final for robot, tracked in maps.tracked.items()},
+        truth,
+        np.random.default_rng([unit.seed, unit.flight, 9]),
+    )
     for trial, index in enumerate(chosen):
         rng = np.random.default_rng([unit.seed, unit.flight, 2, trial])
-        result = refine_sighting(maps.sightings[index], truth, unit.setup.config, rng)
+        sighting = maps.sightings[index]
+        result = refine_sighting(sighting, reference(sighting), unit.setup.config, rng)
         out.add_alignment(result.alignment, result.errors, trial)
         out.add("timing", "icp", result.duration_ms, "ms", trial=trial)

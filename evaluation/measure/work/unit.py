@@ -66,6 +66,7 @@ class Unit:
             "poses": setup.poses,
             "pose_noise": asdict(setup.noise),
             "variant": setup.variant,
+            "reference": asdict(setup.reference),
             "protocol": asdict(self.protocol),
             "showcase": self.showcase,
             "budget": self.budget,

@@ -62,7 +62,7 @@ def test_each_gets_the_prior_that_its_line_declares() -> None:
     np.testing.assert_allclose(exact.T_ground_mav.matrix(), T_GROUND_MAV.matrix(), atol=1e-9)
     # The noisy prior is the start of the refinement trial with the same number.
     rng = np.random.default_rng([3, 1, 2, 5])
-    trial = refine_sighting(given.sighting, truth, Config(), rng)  # type: ignore[arg-type]
+    trial = refine_sighting(given.sighting, T_GROUND_MAV, Config(), rng)
     error = measure.pose_error(noisy.T_ground_mav, given.sighting, truth)  # type: ignore[arg-type]
     assert error.translation_m == pytest.approx(trial.errors["before"].translation_m)
     assert error.rotation_deg == pytest.approx(trial.errors["before"].rotation_deg)

@@ -11,10 +11,12 @@ from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.errors import InputError
 from evaluation.commands.options import PipelineOptions
+from evaluation.commands.sweep import Sweep
 from evaluation.setup.setups import (
     EXACT,
     PAPER_DRIFT,
     Given,
+    Reference,
     Setup,
     with_companions,
     with_localization,
@@ -82,3 +84,13 @@ def test_drift_needs_an_oracle() -> None:
     assert PipelineOptions(poses="oracle", overrides=drift).setup().noise.drift_mav_m == 0.012
     with pytest.raises(InputError, match="give --poses oracle"):
         PipelineOptions(overrides=drift).setup()
+
+
+def test_results_name_a_reference_with_errors() -> None:
+    assert Setup(Config()).condition("nominal").variant == ""
+    turned = Setup(Config(), reference=Reference(ground_camera_deg=1.5))
+    assert turned.condition("nominal").variant.endswith("turned by 0 and 1.5 deg (MAV, ground)")
+    words = ("reference.by=paths", "reference.mav_camera_deg=1")
+    assert Sweep(vary=(), out=None, overrides=words[:1]).setup().reference == Reference("paths")
+    with pytest.raises(InputError, match="no calibration of cameras"):
+        Sweep(vary=(), out=None, overrides=words).setup()
