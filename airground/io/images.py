@@ -1,7 +1,10 @@
-"""Decoding the images of a recording, with errors that name the file and the reason."""
+"""Decoding the images of a recording, with errors that name the file and the reason.
+
+Images are PNG files, and colour or grey may be JPEG; the first bytes decide, not the name."""
 
 from __future__ import annotations
 
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +12,15 @@ import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from PIL import UnidentifiedImageError
+from PIL.JpegImagePlugin import JpegImageFile
 
 from airground.core.arrays import F32, U8, U16, Scalar
 from airground.errors import RecordingError
 from airground.io.png import SIGNATURE, PngHeader, decode_png, warm_up_decoding
 
 _PNG_END = b"IEND\xaeB`\x82"
+_JPEG_START = b"\xff\xd8\xff"
 
 
 def read_grey(path: Path, width: int, height: int) -> U8:
@@ -27,9 +33,18 @@ def read_colour(path: Path, width: int, height: int) -> U8:
     return _read(path, (height, width, 3), np.uint8)
 
 
-def read_depth(path: Path, width: int, height: int, units_per_m: float) -> F32:
-    """(height, width) float32 [m], NaN where the file holds 0; raises RecordingError."""
-    return metric_depth(_read(path, (height, width), np.uint16), units_per_m)
+def read_depth(path: Path, width: int, height: int, units_per_m: float, missing: int = 0) -> F32:
+    """(height, width) float32 [m], NaN where the file holds 0 or `missing`; raises
+    RecordingError."""
+    units = read_units(path, width, height)
+    if missing:
+        units = np.where(units == missing, np.uint16(0), units)
+    return metric_depth(units, units_per_m)
+
+
+def read_units(path: Path, width: int, height: int) -> U16:
+    """(height, width) uint16 values of a depth image as they are; raises RecordingError."""
+    return _read(path, (height, width), np.uint16)
 
 
 def metric_depth(units: U16, units_per_m: float) -> F32:
@@ -55,36 +70,55 @@ def image_size(path: Path) -> tuple[int, int]:
     """Width and height [px], from the file's first bytes; raises RecordingError."""
     data = _bytes(path)
     try:
-        header = PngHeader.read(data)
+        return size_of(data)
     except ValueError as error:
         raise RecordingError(f"{path}: is truncated: {error}") from None
+
+
+def is_image(data: bytes) -> bool:
+    """Whether the bytes begin as PNG or JPEG files do."""
+    return data.startswith((SIGNATURE, _JPEG_START))
+
+
+def size_of(data: bytes) -> tuple[int, int]:
+    """Width and height [px] of a PNG or JPEG image; ValueError where its header is damaged."""
+    if data.startswith(_JPEG_START):
+        return _jpeg(data).size
+    header = PngHeader.read(data)
     return header.width, header.height
 
 
+def decode(data: bytes) -> NDArray[Any]:
+    """A PNG or JPEG image: grey (H, W), or colour (H, W, C) with RGB first.
+    ValueError if it is damaged. The caller has compared `size_of` with what it expects."""
+    if data.startswith(_JPEG_START):
+        return _decode_jpeg(data)
+    if not data.endswith(_PNG_END):
+        raise ValueError("the PNG image is truncated: it has no end")
+    return decode_png(data) if PngHeader.read(data).pixel_bytes else _decode_any(data)
+
+
 def _bytes(path: Path) -> bytes:
-    """A file that starts as PNG files do."""
+    """A file that starts as PNG or JPEG files do."""
     try:
         data = path.read_bytes()
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None
-    if not data.startswith(SIGNATURE):
-        raise RecordingError(f"{path}: is no PNG image")
+    if not is_image(data):
+        raise RecordingError(f"{path}: is no PNG or JPEG image")
     return data
 
 
 def _read(path: Path, shape: tuple[int, ...], dtype: type[Scalar]) -> NDArray[Scalar]:
     data = _bytes(path)
-    if not data.endswith(_PNG_END):
-        raise RecordingError(f"{path}: is truncated: the PNG image has no end")
     try:
-        header = PngHeader.read(data)
+        width, height = size_of(data)
         # Before anything is allocated for it.
-        if (header.height, header.width) != shape[:2]:
+        if (height, width) != shape[:2]:
             raise RecordingError(
-                f"{path}: is {header.width}x{header.height}, "
-                f"the calibration says {shape[1]}x{shape[0]}"
+                f"{path}: is {width}x{height}, the calibration says {shape[1]}x{shape[0]}"
             )
-        image = decode_png(data) if header.pixel_bytes else _decode_any(data)
+        image = decode(data)
     except ValueError as error:
         raise RecordingError(f"{path}: cannot be decoded: {error}") from None
     if image.ndim != len(shape) or image.dtype != dtype:
@@ -94,6 +128,24 @@ def _read(path: Path, shape: tuple[int, ...], dtype: type[Scalar]) -> NDArray[Sc
             f"expected {1 if len(shape) == 2 else shape[2]} of {np.dtype(dtype)}"
         )
     return image
+
+
+def _jpeg(data: bytes) -> JpegImageFile:
+    """The header, with nothing decoded yet."""
+    try:
+        return JpegImageFile(BytesIO(data))
+    except (SyntaxError, OSError, UnidentifiedImageError, IndexError, KeyError, TypeError) as error:
+        raise ValueError(f"the JPEG image is damaged: {error}") from None
+
+
+def _decode_jpeg(data: bytes) -> NDArray[Any]:
+    image = _jpeg(data)
+    if image.mode not in ("L", "RGB"):
+        raise ValueError(f"the JPEG image has the colour model {image.mode}, expected grey or RGB")
+    try:
+        return np.asarray(image)  # as the sensor saw it: an orientation for viewers is ignored
+    except (SyntaxError, OSError) as error:
+        raise ValueError(f"the JPEG image is damaged: {error}") from None
 
 
 def _decode_any(data: bytes) -> NDArray[Any]:

@@ -6,7 +6,7 @@ structure."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import cv2
 import numpy as np
@@ -15,25 +15,45 @@ from numpy.typing import NDArray
 from airground.core.arrays import F32, F64, U8
 from airground.core.camera import PinholeCamera
 
+Model = Literal["radial-tangential", "equidistant"]
+
+MAX_HALF_ANGLE = np.deg2rad(60.0)
+"""Widest view of an undistorted image from its centre to the middle of a side [rad]. A pinhole
+image is stretched by 1 / cos^2 of the angle: by 4 here, without limit towards 90 degrees."""
+FOCAL_STEPS = 40
+"""Bisections for the focal length: they find it to a billionth."""
+MAX_ZOOM = 4.0
+"""Largest focal length that is tried, over the lens's own: the principal point is never so far
+off the centre that an image needs more."""
+
 
 @dataclass(frozen=True)
 class Lens:
-    """A camera as its calibration has it: a pinhole and radial-tangential distortion.
+    """A camera as its calibration has it: a pinhole and a distortion.
 
     Attributes:
         width, height: Image size [px].
         intrinsics: fx, fy, cx, cy [px]; integer pixel coordinates are pixel centres.
-        distortion: k1, k2, p1, p2 and, where there is a fifth, k3.
+        distortion: Coefficients in OpenCV's order. Radial-tangential: k1, k2, p1, p2; k3 fifth;
+            k4, k5, k6 of the denominator up to the eighth; s1 to s4 (thin prism) up to the
+            twelfth; two tilts up to the fourteenth. Equidistant: k1, k2, k3, k4.
+        model: Kind of distortion.
     """
 
     width: int
     height: int
     intrinsics: tuple[float, float, float, float]
     distortion: tuple[float, ...]
+    model: Model = "radial-tangential"
 
     def matrix(self) -> F64:
         """The (3, 3) intrinsic matrix."""
         return PinholeCamera(self.width, self.height, *self.intrinsics).matrix()
+
+    @property
+    def bends(self) -> bool:
+        """Whether images differ from a pinhole camera's."""
+        return self.model == "equidistant" or any(self.distortion)
 
 
 class Undistortion:
@@ -43,14 +63,9 @@ class Undistortion:
         self._maps: tuple[NDArray[Any], NDArray[Any]] | None = None
         self._nearest: NDArray[Any] | None = None
         size = (lens.width, lens.height)
-        matrix = original = lens.matrix()
-        if any(lens.distortion):
-            distortion = np.array(lens.distortion)
-            optimal, _ = cv2.getOptimalNewCameraMatrix(original, distortion, size, 0.0, size)
-            matrix = np.asarray(optimal, np.float64)
-            x, y = cv2.initUndistortRectifyMap(
-                original, distortion, np.eye(3), matrix, size, cv2.CV_32FC1
-            )
+        matrix = lens.matrix()
+        if lens.bends:
+            matrix, x, y = _fisheye(lens) if lens.model == "equidistant" else _radial(lens)
             self._maps = cv2.convertMaps(x, y, cv2.CV_16SC2)
             self._nearest, _ = cv2.convertMaps(x, y, cv2.CV_16SC2, nninterpolation=True)
         fx, fy, cx, cy = (float(matrix[at]) for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
@@ -77,3 +92,60 @@ class Undistortion:
             borderValue=float("nan"),
         )
         return np.asarray(straight, np.float32)
+
+
+Maps = tuple[F64, NDArray[Any], NDArray[Any]]
+"""The (3, 3) pinhole matrix, and for each of its pixels the x and y in the lens's image."""
+
+
+def _radial(lens: Lens) -> Maps:
+    size, original, distortion = (lens.width, lens.height), lens.matrix(), np.array(lens.distortion)
+    optimal, _ = cv2.getOptimalNewCameraMatrix(original, distortion, size, 0.0, size)
+    matrix = np.asarray(optimal, np.float64)
+    x, y = cv2.initUndistortRectifyMap(original, distortion, np.eye(3), matrix, size, cv2.CV_32FC1)
+    return matrix, x, y
+
+
+def _fisheye(lens: Lens) -> Maps:
+    """The widest pinhole camera, up to `MAX_HALF_ANGLE`, whose pixels the lens all sees."""
+    centre = (lens.width - 1) / 2, (lens.height - 1) / 2
+    low = max(lens.width, lens.height) / 2 / np.tan(MAX_HALF_ANGLE)
+    focal_px = low
+    if not _inside(lens, _square(low, centre)):
+        # Straight ahead an equidistant lens is a pinhole: at some focal length, all is inside.
+        focal_px = MAX_ZOOM * max(low, *lens.intrinsics[:2])
+        for _ in range(FOCAL_STEPS):
+            middle = (low + focal_px) / 2
+            if _inside(lens, _square(middle, centre)):
+                focal_px = middle
+            else:
+                low = middle
+    matrix = _square(focal_px, centre)
+    x, y = cv2.fisheye.initUndistortRectifyMap(
+        lens.matrix(),
+        np.array(lens.distortion),
+        np.eye(3),
+        matrix,
+        (lens.width, lens.height),
+        cv2.CV_32FC1,
+    )
+    return matrix, x, y
+
+
+def _square(focal_px: float, centre: tuple[float, float]) -> F64:
+    return np.array([[focal_px, 0, centre[0]], [0, focal_px, centre[1]], [0, 0, 1.0]])
+
+
+def _inside(lens: Lens, matrix: F64) -> bool:
+    """Whether every pixel of the pinhole camera lies in the lens's image: the border decides."""
+    x, y = np.arange(lens.width, dtype=np.float64), np.arange(lens.height, dtype=np.float64)
+    border = np.concatenate(
+        [
+            *(np.column_stack([x, np.full(lens.width, side)]) for side in (0.0, y[-1])),
+            *(np.column_stack([np.full(lens.height, side), y]) for side in (0.0, x[-1])),
+        ]
+    )
+    points = ((border - matrix[:2, 2]) / matrix[[0, 1], [0, 1]])[:, None]
+    bent = cv2.fisheye.distortPoints(points, lens.matrix(), np.array(lens.distortion))[:, 0]
+    sides = np.array([lens.width - 1, lens.height - 1])
+    return bool(np.isfinite(bent).all() and (bent >= 0).all() and (bent <= sides).all())

@@ -115,8 +115,9 @@ def check_up_in_body(up_body: F64, imu_path: Path) -> None:
         )
 
 
-def rigid(numbers: ArrayLike, path: Path, key: str) -> SE3:
-    """A pose from 16 numbers, row by row; RecordingError where they are no rigid motion."""
+def rigid(numbers: ArrayLike, path: Path, key: str, tolerance: float = RIGID_TOLERANCE) -> SE3:
+    """A pose from 16 numbers, row by row; RecordingError where they are no rigid motion.
+    `tolerance` is how far R R^T may differ from I."""
     matrix = np.asarray(numbers, np.float64)
     if matrix.size != 16:
         raise RecordingError(f"{path}: key '{key}': expected 16 numbers, got {matrix.size}")
@@ -125,7 +126,7 @@ def rigid(numbers: ArrayLike, path: Path, key: str) -> SE3:
     if not np.isfinite(matrix).all() or not (matrix[3] == (0, 0, 0, 1)).all():
         raise RecordingError(f"{path}: key '{key}': expected finite rows and a last of 0, 0, 0, 1")
     off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
-    if off > RIGID_TOLERANCE or np.linalg.det(rotation) < 0:
+    if off > tolerance or np.linalg.det(rotation) < 0:
         raise RecordingError(
             f"{path}: key '{key}': is not rigid: its 3x3 part is off a rotation by {off:.1e} "
             f"(determinant {np.linalg.det(rotation):.3f}); expected R R^T = I, determinant 1"

@@ -26,6 +26,7 @@ from airground.core.messages import (
 from airground.core.se3 import SE3
 from airground.core.work_ahead import read_ahead
 from airground.errors import RecordingError
+from airground.io.frame_numbers import SECOND_NS, numbers_of
 
 NOTHING: Mapping[Source, Collection[int]] = MappingProxyType({})
 BOTH = (Source.GROUND, Source.MAV)
@@ -66,7 +67,7 @@ class RobotRecording(Generic[Image]):
 
     Attributes:
         path: The folder.
-        layout: "airground", "euroc" or "tum".
+        layout: "airground", "euroc", "tum", "7scenes" or "ros".
         robot: The robot that recorded it, or whose place it takes.
         calibration: The nominal calibration, as front ends use it.
         camera_stamps: (N,) int64 stamps of the images [ns].
@@ -74,6 +75,9 @@ class RobotRecording(Generic[Image]):
         read_image: Reads the image at an index of `camera_stamps`.
         pose_frame: Frame whose poses the publisher states as truth: "body", "imu" or "camera".
         T_pose_camera: Pose of the camera in that frame, to write comparable trajectories.
+        frame_rate_hz: Rate by which the publisher's frame numbers became stamps [Hz]; None where
+            the recording has stamps.
+        assumed: What the recording does not state, and what was taken for it.
     """
 
     path: Path
@@ -86,6 +90,8 @@ class RobotRecording(Generic[Image]):
     read_image: Callable[[int], Image]
     pose_frame: str
     T_pose_camera: SE3
+    frame_rate_hz: float | None = None
+    assumed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         freeze(self, "camera_stamps", (None,), np.int64)
@@ -101,6 +107,12 @@ class RobotRecording(Generic[Image]):
         if index == len(self.camera_stamps) or self.camera_stamps[index] != stamp_ns:
             raise ValueError(f"no image has the stamp {stamp_ns}")
         return self.read_image(index)
+
+    def published_stamps(self, stamps_ns: I64) -> I64:
+        """Stamps (N,) [ns] as the publisher counts: frame numbers, where it does, as seconds."""
+        if self.frame_rate_hz is None:
+            return stamps_ns
+        return numbers_of(stamps_ns, self.frame_rate_hz) * SECOND_NS
 
     def bundler(self) -> Bundler:
         """Puts this robot's samples before its images."""

@@ -15,11 +15,35 @@ from airground.errors import RecordingError
 from airground.io.calibration import MAX_SIDE_PX
 from airground.io.euroc import read_lines
 from airground.io.header import shortened
-from airground.io.lens import Lens
+from airground.io.lens import Lens, Model
 from airground.io.plausibility import rigid
 
-DISTORTION_MODELS = ("radial-tangential", "radtan")
-"""Names of the one distortion model that is known, as EuRoC and Kalibr write it."""
+DISTORTION_MODELS: dict[str, Model] = {
+    "radial-tangential": "radial-tangential",
+    "radtan": "radial-tangential",
+    "plumb_bob": "radial-tangential",
+    "rational_polynomial": "radial-tangential",
+    "equidistant": "equidistant",
+    "fisheye": "equidistant",
+}
+"""Names of distortion models, as EuRoC, Kalibr, ROS and OpenCV write them."""
+COEFFICIENTS: dict[Model, tuple[int, ...]] = {
+    "radial-tangential": (4, 5, 8, 12, 14),
+    "equidistant": (4,),
+}
+"""How many coefficients a model can have, in OpenCV's order."""
+NO_DISTORTION = (None, "", "none")
+"""How files say that images are free of distortion."""
+SYNONYMS = {"distortion_coefficients": "distortion_coeffs"}
+"""Keys of EuRoC's `sensor.yaml` that Kalibr writes otherwise."""
+POSE = "T_BS"
+NOISE_KEYS = tuple(
+    f"{sensor}_{kind}"
+    for sensor in ("gyroscope", "accelerometer")
+    for kind in ("noise_density", "random_walk")
+)
+DEPTH_UNITS, RATE = "depth_units_per_m", "rate_hz"
+"""Keys of a calibration for the value of one metre of depth, and for folders without stamps."""
 
 
 class _PlainLoader(yaml.SafeLoader):  # type: ignore[misc]  # yaml has no types
@@ -61,11 +85,31 @@ def read_lens(path: Path) -> Lens:
     model = values.get("camera_model", "pinhole")
     if model != "pinhole":
         raise RecordingError(
-            f"{path}: key 'camera_model': {shortened(model)} is unknown; known: pinhole"
+            f"{path}: key 'camera_model': {shortened(model)} is unknown; known: pinhole (fisheye "
+            "lenses: pinhole with the distortion_model equidistant)"
         )
     width, height = (round(v) for v in _numbers(values, "resolution", (2,), path))
-    fx, fy, cx, cy = _numbers(values, "intrinsics", (4,), path)
-    coefficients = _distortion(values, path)
+    intrinsics = _numbers(values, "intrinsics", (4,), path)
+    bent, coefficients = _distortion(values, path)
+    return checked_lens(width, height, intrinsics, bent, coefficients, path)
+
+
+def checked_lens(
+    width: int,
+    height: int,
+    intrinsics: tuple[float, ...],
+    model: str,
+    coefficients: tuple[float, ...],
+    path: Path,
+) -> Lens:
+    """A lens whose numbers can be right; RecordingError names `path`, the key and the rule."""
+    fx, fy, cx, cy = intrinsics
+    if fx > 0 > fy:
+        raise RecordingError(
+            f"{path}: key 'intrinsics': fy is negative ({fy:g}), as ICL-NUIM states it for a y "
+            f"axis that points up; here y points down, for the same images: give {-fy:g}, and "
+            "mirror published poses that do not fit then (docs/bring_your_own.md)"
+        )
     if min(width, height) < 1 or min(fx, fy) <= 0:
         raise RecordingError(f"{path}: image size and focal lengths (fx, fy) must be positive")
     if max(width, height) > MAX_SIDE_PX:
@@ -77,12 +121,30 @@ def read_lens(path: Path) -> Lens:
             f"{path}: key 'intrinsics': the principal point ({cx:g}, {cy:g}) lies outside the "
             f"{width}x{height} image; expected fx, fy, cx, cy in pixels"
         )
-    return Lens(width, height, (fx, fy, cx, cy), coefficients)
+    if model not in DISTORTION_MODELS:
+        raise RecordingError(
+            f"{path}: key 'distortion_model': {shortened(model)} is unknown; known: "
+            f"{', '.join(DISTORTION_MODELS)}, none"
+        )
+    kind = DISTORTION_MODELS[model]
+    if len(coefficients) not in COEFFICIENTS[kind]:
+        wanted = " or ".join(map(str, COEFFICIENTS[kind]))
+        raise RecordingError(
+            f"{path}: key 'distortion_coefficients': expected {wanted} numbers for "
+            f"{model}, got {len(coefficients)}"
+        )
+    return Lens(width, height, (fx, fy, cx, cy), coefficients, kind)
+
+
+def read_positive(path: Path, key: str) -> float | None:
+    """A positive number; None where the file has no such key. Raises like `read_lens`."""
+    values = read_mapping(path)
+    return _positive(values[key], key, path) if key in values else None
 
 
 def read_pose(path: Path) -> SE3:
     """Read `T_BS`, the sensor in the body; raises like `read_lens`."""
-    pose = _value(read_mapping(path), "T_BS", path)
+    pose = _value(read_mapping(path), POSE, path)
     data = _as_numbers(pose.get("data") if isinstance(pose, dict) else None)
     if data is None:
         raise RecordingError(f"{path}: key 'T_BS': expected 'data' with 16 numbers, row by row")
@@ -92,43 +154,41 @@ def read_pose(path: Path) -> SE3:
 def read_imu_noise(path: Path) -> ImuNoise:
     """Read an IMU's noise densities and random walks; raises like `read_lens`."""
     values = read_mapping(path)
-    names = ("gyroscope", "accelerometer")
-    keys = [f"{name}_{kind}" for name in names for kind in ("noise_density", "random_walk")]
-    numbers = []
-    for key in keys:
-        value = _value(values, key, path)
-        number = _as_numbers([value])
-        if number is None or number[0] <= 0:
-            raise RecordingError(
-                f"{path}: key '{key}': expected a positive number, got {shortened(value)}"
-            )
-        numbers.append(number[0])
-    return ImuNoise(*numbers)
+    return ImuNoise(*(_positive(_value(values, key, path), key, path) for key in NOISE_KEYS))
 
 
-def _distortion(values: dict[str, Any], path: Path) -> tuple[float, ...]:
-    model = _value(values, "distortion_model", path)
-    if model not in DISTORTION_MODELS:
+def _positive(value: object, key: str, path: Path) -> float:
+    number = _as_numbers([value])
+    if number is None or number[0] <= 0:
         raise RecordingError(
-            f"{path}: key 'distortion_model': {shortened(model)} is unknown; known: "
-            f"{', '.join(DISTORTION_MODELS)} (coefficients k1, k2, p1, p2 and perhaps k3)"
+            f"{path}: key '{key}': expected a positive number, got {shortened(value)}"
         )
-    return _numbers(values, "distortion_coefficients", (4, 5), path)
+    return number[0]
+
+
+def _distortion(values: dict[str, Any], path: Path) -> tuple[str, tuple[float, ...]]:
+    model = _value(values, "distortion_model", path)
+    if model in NO_DISTORTION:
+        return "radial-tangential", (0.0,) * 4
+    # How many there must be depends on the model, which is checked with them.
+    return str(model), _numbers(values, "distortion_coefficients", None, path)
 
 
 def _value(values: dict[str, Any], key: str, path: Path) -> Any:
-    if key not in values:
-        raise RecordingError(f"{path}: key '{key}' is missing")
-    return values[key]
+    for name in (key, SYNONYMS.get(key)):
+        if name in values:
+            return values[name]
+    raise RecordingError(f"{path}: key '{key}' is missing")
 
 
 def _numbers(
-    values: dict[str, Any], key: str, counts: tuple[int, ...], path: Path
+    values: dict[str, Any], key: str, counts: tuple[int, ...] | None, path: Path
 ) -> tuple[float, ...]:
+    """Finite numbers, as many as one of `counts` says; None for any number of them."""
     value = _value(values, key, path)
     numbers = _as_numbers(value)
-    if numbers is None or len(numbers) not in counts:
-        wanted = " or ".join(map(str, counts))
+    if numbers is None or (counts and len(numbers) not in counts):
+        wanted = " or ".join(map(str, counts or ())) or "a list of"
         raise RecordingError(
             f"{path}: key '{key}': expected {wanted} numbers, got {shortened(value)}"
         )

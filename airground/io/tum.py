@@ -85,9 +85,18 @@ def write_tum(path: Path | str, trajectory: Trajectory) -> None:
 
 
 def read_associations(path: Path) -> tuple[I64, list[str], list[str]]:
-    """Colour stamps (N,) [ns], colour files and depth files, relative to the list's folder."""
+    """Colour stamps (N,) [ns], colour files and depth files, relative to the list's folder.
+    Where the first file of every line, by its path, is a depth image, it is read as such."""
     stamps, rows = _read_stamped(path, "time colour-file time depth-file")
-    return stamps, [row[1] for row in rows], [row[3] for row in rows]
+    first, second = [row[1] for row in rows], [row[3] for row in rows]
+    if not all("depth" in a and "depth" not in b for a, b in zip(first, second, strict=True)):
+        return stamps, first, second
+    try:
+        colour_stamps = np.array([parse_stamp(row[2]) for row in rows], np.int64)
+    except ValueError as error:
+        raise RecordingError(f"{path}: {error}") from None
+    check_stamps(colour_stamps, path)
+    return colour_stamps, second, first
 
 
 def read_image_list(path: Path) -> tuple[I64, list[str]]:

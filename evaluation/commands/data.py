@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar, Literal
 from tyro.conf import Positional, UseAppendAction
 
 from airground.errors import InputError
+from evaluation.commands.folder_options import FolderOptions
 from evaluation.commands.options import (
     RENDER_S_PER_S,
     OutOption,
@@ -107,17 +108,16 @@ class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Inspect(Verb):
+class Inspect(FolderOptions, Verb):
     """Say what is in a dataset, and what is wrong with it.
 
-    For recordings and datasets of simulate, EuRoC and TUM RGB-D folders: digests, rates, gaps,
-    calibration, and whether the true poses fit the images. Exits with 3 if something is wrong.
+    For recordings and datasets of simulate, folders of EuRoC, TUM RGB-D and 7-Scenes, and ROS bags:
+    digests, rates, gaps, calibration, what was assumed, and whether the true poses fit the images.
+    Exits with 3 if something is wrong.
     """
 
     dataset: Annotated[Positional[Path], Shown("DATASET")]
-    """folder of the dataset"""
-    calibration: Annotated[Path | None, Shown("FILE", "the folder's own")] = None
-    """camera calibration of a plain folder, in the form of EuRoC's sensor.yaml"""
+    """folder of the dataset, or a bag"""
     json: bool = False
     """print JSON in place of a table"""
 
@@ -127,7 +127,7 @@ class Inspect(Verb):
         from evaluation.setup.progress import step
 
         with step("inspecting"):
-            layout, findings = inspect_dataset(self.dataset, self.calibration)
+            layout, findings = inspect_dataset(self.dataset, self.open)
         if self.json:
             print(as_json(str(self.dataset), layout, findings))
         else:

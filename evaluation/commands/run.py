@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 from tyro.conf import Positional
 
 from airground.errors import InputError
+from evaluation.commands.folder_options import OwnRecordings
 from evaluation.commands.options import (
     RUN_S_PER_S,
     START_S,
@@ -35,22 +36,6 @@ if TYPE_CHECKING:
     from sim.recording.truth import Truth
 
 DROPPED = "dropped.json"
-
-
-@dataclass(frozen=True, kw_only=True)
-class OwnRecordings:
-    """Recordings of two robots from anywhere."""
-
-    heading: ClassVar[str] = "your own recordings, in place of RECORDING"
-
-    mav: Annotated[Path | None, Shown("DIR")] = None
-    """the MAV's EuRoC folder"""
-    ground: Annotated[Path | None, Shown("DIR")] = None
-    """the ground robot's TUM RGB-D folder"""
-    mav_calibration: Annotated[Path | None, Shown("FILE", "the folder's own")] = None
-    """camera calibration (EuRoC's sensor.yaml)"""
-    ground_calibration: Annotated[Path | None, Shown("FILE", "the folder's own")] = None
-    """camera calibration in the same form"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,16 +129,16 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
     """leave out the images that a live run dropped (its dropped.json)"""
 
     def main(self) -> None:
-        own = (self.mav, self.ground, self.mav_calibration, self.ground_calibration)
         match self.recording, self.mav, self.ground:
-            case Path() as recording, *_ if own == (None,) * 4:
+            case Path() as recording, *_ if not self.given_any():
                 self._run_simulated(recording)
             case None, Path() as mav, Path() as ground:
                 self._run_own(mav, ground)
             case _:
                 raise InputError(
                     "give either RECORDING, or both --mav DIR and --ground DIR (with which alone "
-                    "--mav-calibration and --ground-calibration go)"
+                    "--mav-calibration, --ground-calibration, --ground-depth-scale, --mav-topics "
+                    "and --ground-topics go)"
                 )
 
     def _run_simulated(self, path: Path) -> None:
@@ -186,9 +171,6 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
         print_summary(summary)
 
     def _run_own(self, mav: Path, ground: Path) -> None:
-        from airground.core.cloud import Source
-        from airground.io.open_recording import open_robot
-        from airground.io.robot_recording import Pair
         from evaluation.run.own_recordings import print_pair, run_pair, write_pair
         from evaluation.setup.output import fresh_folder
         from evaluation.setup.progress import announce
@@ -200,10 +182,7 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
         setup = self._setup_with("")
         level, seed = self.settings().rerun.level, self.checked_seed()
         with fresh_folder(self.out) as folder:
-            pair = Pair(
-                open_robot(mav, Source.MAV, self.mav_calibration),
-                open_robot(ground, Source.GROUND, self.ground_calibration),
-            )
+            pair = self.pair(mav, ground)
             seconds = max(pair.mav.duration_s, pair.ground.duration_s)
             name = f"{mav.name}, {ground.name}"
             announce(f"runs {recorded(name, seconds)}", START_S + seconds * RUN_S_PER_S)
@@ -238,7 +217,7 @@ def simulated(path: Path) -> tuple[Recording, Truth]:
     if path.is_dir() and not (path / HEADER).exists():
         raise InputError(
             f"{path}: has no {HEADER}; expected a recording that simulate has written "
-            "(EuRoC and TUM RGB-D: track takes one robot's, run --mav DIR --ground DIR two)"
+            "(of others' folders, track takes one robot's, run --mav DIR --ground DIR two)"
         )
     recording = Recording.open(path)
     return recording, Truth.open(recording.path)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from tyro.conf import Positional
 
 from airground.errors import InputError
-from airground.io.layout import HEADER
+from evaluation.commands.folder_options import FolderOptions
 from evaluation.commands.options import (
     START_S,
     TRACK_S_PER_S,
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Track(ConfigOptions, SeedOption, OutOption, Verb):
+class Track(FolderOptions, ConfigOptions, SeedOption, OutOption, Verb):
     """Track one robot alone, with one front end or several.
 
     Leaves the trajectory and a summary; with several front ends one folder for each, and a
@@ -36,18 +36,15 @@ class Track(ConfigOptions, SeedOption, OutOption, Verb):
     """
 
     folder: Annotated[Positional[Path], Shown("FOLDER")]
-    """simulate's recording, EuRoC (MAV) or TUM RGB-D (ground robot)"""
+    """simulate's recording, EuRoC (MAV), TUM RGB-D or 7-Scenes (ground robot), or a ROS bag"""
     robot: Annotated[Literal["mav", "ground"] | None, Shown("{mav,ground}", "by the layout")] = None
-    """which one, for a recording of simulate"""
+    """which one, for a recording of simulate or a bag"""
     front_end: Annotated[tuple[str, ...], Shown("NAME ...", "slam")] = ()
     """slam, file, and for the ground robot open3d and opencv"""
     trajectory: Annotated[Path | None, Shown("FILE")] = None
     """poses for the front end file: TUM, of the camera, metric, z up"""
-    calibration: Annotated[Path | None, Shown("FILE", "the folder's own")] = None
-    """camera calibration (EuRoC's sensor.yaml)"""
 
     def main(self) -> None:
-        from airground.io.open_recording import open_robot
         from evaluation.run.own_recordings import print_alone, run_alone, write_alone
         from evaluation.setup.output import fresh_folder
         from evaluation.setup.progress import announce
@@ -56,7 +53,7 @@ class Track(ConfigOptions, SeedOption, OutOption, Verb):
 
         names, robot = self._names(), self._source()
         with fresh_folder(self.out) as out:
-            recording = open_robot(self.folder, robot, self.calibration)
+            recording = self.open(self.folder, robot)
             true_pose = true_camera(recording)
             front_ends = {name: self._front_end(name, recording) for name in names}
             seconds = recording.duration_s
@@ -85,19 +82,22 @@ class Track(ConfigOptions, SeedOption, OutOption, Verb):
             InputError: The layout does not say which.
         """
         from airground.core.cloud import Source
-        from airground.io.plain_euroc import euroc_folder
-        from airground.io.plain_tum import is_tum_folder
+        from airground.io.open_recording import layout_of
 
         if self.robot is not None:
             return Source[self.robot.upper()]
-        if euroc_folder(self.folder) is not None and not (self.folder / HEADER).exists():
-            return Source.MAV
-        if is_tum_folder(self.folder):
-            return Source.GROUND
-        if (self.folder / HEADER).exists():
-            raise InputError(
-                f"{self.folder}: holds both robots; give --robot mav or --robot ground"
-            )
+        match layout_of(self.folder):
+            case "airground":
+                raise InputError(
+                    f"{self.folder}: holds both robots; give --robot mav or --robot ground"
+                )
+            case "ros":
+                raise InputError(
+                    f"{self.folder}: is a bag; give --robot mav (images, IMU) or --robot ground "
+                    "(colour and depth)"
+                )
+            case "tum" | "7scenes":
+                return Source.GROUND
         return Source.MAV  # what opens the folder says what is wrong with it
 
     def _front_end(self, name: str, recording: RobotRecording[Any]) -> FrontEnd[Any]:

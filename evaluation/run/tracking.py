@@ -140,11 +140,12 @@ def write_paths(
     folder: Path, name: str, recording: RobotRecording, log: FrontEndLog, final: Trajectory | None
 ) -> None:
     """Write `NAME.tum` (final poses) and `NAME_live.tum` (poses as first given), where any.
-    Poses are those of `recording.pose_frame`, the frame whose truth the publisher states, so that
-    `evo_ape tum` compares the files as they are."""
+    Poses are those of `recording.pose_frame`, the frame whose truth the publisher states, at the
+    publisher's stamps, so that `evo_ape tum` compares the files as they are."""
     T_camera_pose = recording.T_pose_camera.inverse()
     for file, path in ((name, final), (f"{name}_live", live_path(log))):
         if path is not None:
             poses = [path[index] @ T_camera_pose for index in range(len(path))]
-            written = Trajectory.from_poses(path.stamps_ns.tolist(), poses)
+            stamps_ns = recording.published_stamps(path.stamps_ns)
+            written = Trajectory.from_poses(stamps_ns.tolist(), poses)
             write_tum(folder / f"{file}.tum", written)

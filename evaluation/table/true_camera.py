@@ -13,7 +13,9 @@ from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.errors import RecordingError
 from airground.io.euroc import read_lines
+from airground.io.frame_numbers import SECOND_NS, stamps_of
 from airground.io.plain_euroc import euroc_folder
+from airground.io.plausibility import rigid
 from airground.io.robot_recording import RobotRecording
 from airground.io.tum import read_tum
 
@@ -23,6 +25,9 @@ SHORT_GAP_NS, LONG_GAP_NS = 50_000_000, 150_000_000
 """Gaps up to the first are always interpolated, gaps beyond the second never [ns]. A robot that
 accelerates by 2 m/s^2 leaves the straight line by 0.6 mm in the first and 5.6 mm in the second."""
 UNIT_TOLERANCE = 1e-2
+POSES = "frame-*.pose.txt"
+POSE_TOLERANCE = 2e-3
+"""How far R R^T of such a pose may differ from I: the data set's differ by up to 4e-4."""
 EUROC_COLUMNS = 8
 """Stamp, position and quaternion wxyz; velocities and biases follow."""
 
@@ -30,8 +35,8 @@ EUROC_COLUMNS = 8
 def true_camera(recording: RobotRecording) -> Callable[[int], SE3 | None] | None:
     """The true camera pose at a stamp [ns], None where it is unknown; None without truth.
 
-    Ours: `truth/`. TUM RGB-D: `groundtruth.txt`, of the camera. EuRoC:
-    `state_groundtruth_estimate0`, of the body.
+    Ours: `truth/`. TUM RGB-D: `groundtruth.txt`, of the camera. 7-Scenes: `frame-*.pose.txt`, of
+    the camera. EuRoC: `state_groundtruth_estimate0`, of the body. Bags: none is read.
 
     Raises:
         AirgroundError: The truth is there, but damaged.
@@ -47,7 +52,14 @@ def true_camera(recording: RobotRecording) -> Callable[[int], SE3 | None] | None
             return truth.T_world_mav_camera if is_mav else truth.T_world_ground_camera
         case "tum":
             file = recording.path / "groundtruth.txt"
-            return _lookup(read_tum(file), SE3.identity()) if file.exists() else None
+            if not file.exists():
+                return None
+            return _lookup(_at_stamps(read_tum(file), recording), SE3.identity())
+        case "7scenes":
+            found = read_numbered_poses(recording.path)
+            return _lookup(_at_stamps(found, recording), SE3.identity()) if found else None
+        case "ros":
+            return None
         case _:
             folder = euroc_folder(recording.path)
             assert folder is not None
@@ -82,6 +94,35 @@ def read_euroc_poses(path: Path) -> Trajectory:
         return Trajectory(stamps, rotations, values[:, :3])
     except ValueError as error:
         raise RecordingError(f"{path}: {error}") from None
+
+
+def read_numbered_poses(folder: Path) -> Trajectory | None:
+    """Poses of `frame-000000.pose.txt`, four rows each, by frame number as seconds; None without.
+    Frames whose pose is not finite are left out.
+
+    Raises:
+        RecordingError: Names the file and what is wrong.
+    """
+    stamps, poses = [], []
+    for file in sorted(folder.glob(POSES)):
+        try:
+            matrix = np.array([line.split() for line in read_lines(file) if line], np.float64)
+            number = int(file.name.split(".")[0].removeprefix("frame-"))
+        except ValueError as error:
+            raise RecordingError(f"{file}: expected four rows of four numbers: {error}") from None
+        if matrix.shape == (4, 4) and not np.isfinite(matrix).all():
+            continue
+        stamps.append(number * SECOND_NS)
+        poses.append(rigid(matrix, file, "pose", POSE_TOLERANCE))
+    return Trajectory.from_poses(stamps, poses) if stamps else None
+
+
+def _at_stamps(poses: Trajectory, recording: RobotRecording) -> Trajectory:
+    """Poses whose stamps are frame numbers, at the stamps that the images were given."""
+    if recording.frame_rate_hz is None:
+        return poses
+    stamps_ns = stamps_of(poses.stamps_ns // SECOND_NS, recording.frame_rate_hz)
+    return Trajectory(stamps_ns, poses.rotations, poses.translations)
 
 
 def _lookup(poses: Trajectory, T_pose_camera: SE3) -> Callable[[int], SE3 | None]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 
-from airground.core.messages import GroundImage, MavImage
+from airground.core.messages import GroundImage, ImuSamples, MagneticSamples, MavImage
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.io.calibration import CameraTable
@@ -92,3 +93,16 @@ def _camera_table(sequence: Sequence) -> CameraTable:
         rate_hz=30.0,
         time_offset_ns=0,
     )
+
+
+def content(message: Any) -> list[np.ndarray]:
+    match message:
+        case MavImage():
+            return [np.array(message.stamp_ns), message.image]
+        case GroundImage():
+            return [np.array(message.stamp_ns), message.colour, message.depth]
+        case ImuSamples():
+            return [message.stamps_ns, message.gyro, message.accelerometer]
+        case MagneticSamples():
+            return [message.stamps_ns, message.field]
+    raise TypeError(type(message))

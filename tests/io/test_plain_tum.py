@@ -15,9 +15,9 @@ from airground.core.cloud import Source
 from airground.core.messages import GroundImage, MavImage
 from airground.errors import RecordingError
 from airground.io.open_recording import open_robot
-from airground.io.plain_tum import associate
 from airground.io.robot_recording import RobotRecording
 from airground.io.tum import parse_stamp
+from airground.io.tum_lists import associate
 from tests.io.plain_folders import TUM_COLOUR_S, tum_image, write_tum
 
 REAL = Path(__file__).parents[3] / "shared" / "real" / "tum_fr1_rpy_head"
@@ -177,8 +177,8 @@ BAD: dict[str, tuple[Callable[[Path], object], str]] = {
         r"rgb/.*\.png: has 1 channels of uint8, expected 3",
     ),
     "model": (
-        lambda f: (f / "sensor.yaml").write_text(CALIBRATION.replace("radtan", "fisheye")),
-        r"sensor\.yaml: key 'distortion_model': 'fisheye' is unknown",
+        lambda f: (f / "sensor.yaml").write_text(CALIBRATION.replace("radtan", "mei")),
+        r"sensor\.yaml: key 'distortion_model': 'mei' is unknown",
     ),
     "accelerometer": (
         lambda f: (f / "accelerometer.txt").write_text("1305031102.1 0 9.81\n"),

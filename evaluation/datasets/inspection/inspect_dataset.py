@@ -1,18 +1,19 @@
-"""Inspection of a dataset: simulated recordings, a plain EuRoC or a plain TUM RGB-D folder."""
+"""Inspection of a dataset: simulated recordings, a folder of others, or a ROS bag."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from airground.core.cloud import Source
 from airground.errors import InputError, RecordingError
+from airground.io.depth_scale import plausible
 from airground.io.layout import HEADER
-from airground.io.open_recording import open_robot
-from airground.io.plain_euroc import euroc_folder
-from airground.io.plain_tum import is_tum_folder
+from airground.io.open_recording import layout_of, open_robot, unknown_layout
 from airground.io.recording import Recording
 from airground.io.robot_recording import RobotRecording
 from evaluation.datasets.inspection.findings import Finding, Verdict, look_at_stamps
@@ -30,31 +31,49 @@ MIN_DEPTH = 0.05
 """Share of pixels with depth; below it depth images are probably misread."""
 DEPTH_SAMPLES = 10
 """Images in which depth is inspected, spread evenly."""
+MIXED_UP = {5.0: (1000, 5000), 0.2: (5000, 1000)}
+"""Factors that mend depth whose common scales were mixed up: true one, and one it was read with."""
 
 
-def inspect_dataset(path: Path, calibration_file: Path | None = None) -> tuple[str, list[Finding]]:
+Opener = Callable[[Path, Source], RobotRecording[Any]]
+"""Opens one robot's recording, with what the user says of it."""
+
+
+def inspect_dataset(path: Path, opener: Opener = open_robot) -> tuple[str, list[Finding]]:
     """Inspect a dataset; what keeps it from being read is a finding, too.
 
     Returns:
-        Its layout ("airground", "dataset" of many, "euroc" or "tum"), and the findings.
+        Its layout ("airground", "dataset" of many, "euroc", "tum", "7scenes" or "ros"), and the
+        findings.
 
     Raises:
-        InputError: The folder has no known layout.
+        InputError: The path has no known layout.
     """
-    if not path.is_dir():
+    if not path.exists():
         raise InputError(f"{path}: no such folder")
-    if (path / HEADER).exists():
-        return "airground", _ours(path)
-    if (path / PLAN).exists():
+    layout = layout_of(path)
+    if layout == "airground":
+        return layout, _ours(path)
+    if path.is_dir() and (path / PLAN).exists():
         return "dataset", _many(path)
-    if euroc_folder(path) is not None:
-        return "euroc", _robot(path, Source.MAV, calibration_file)
-    if is_tum_folder(path):
-        return "tum", _robot(path, Source.GROUND, calibration_file)
-    raise InputError(
-        f"{path}: holds neither {HEADER} (a recording of ours) nor {PLAN} (a dataset of ours) nor "
-        "mav0/cam0 (EuRoC) nor rgb.txt (TUM RGB-D)"
-    )
+    match layout:
+        case "euroc":
+            return layout, _robot(path, Source.MAV, opener)
+        case "tum" | "7scenes":
+            return layout, _robot(path, Source.GROUND, opener)
+        case "ros":
+            return layout, _bag(path, opener)
+    raise unknown_layout(path, f", {PLAN} (a dataset of ours)")
+
+
+def _bag(path: Path, opener: Opener) -> list[Finding]:
+    """Both robots that a bag may hold; one that is not in it is no fault."""
+    found = {robot: _robot(path, robot, opener) for robot in (Source.MAV, Source.GROUND)}
+    readable = [robot for robot, findings in found.items() if len(findings) > 1]
+    for robot, findings in found.items():
+        if robot not in readable and readable:
+            found[robot] = [replace(one, verdict=Verdict.NOTED) for one in findings]
+    return [one for findings in found.values() for one in findings]
 
 
 def _many(path: Path) -> list[Finding]:
@@ -86,14 +105,18 @@ def _ours(path: Path) -> list[Finding]:
     else:
         count = len(recording.header.digests)
         findings.append(Finding("", "digests", f"all {count} are right"))
-    return findings + _robot(path, Source.MAV, None) + _robot(path, Source.GROUND, None)
+    return [
+        *findings,
+        *(one for robot in (Source.MAV, Source.GROUND) for one in _robot(path, robot, open_robot)),
+    ]
 
 
-def _robot(path: Path, robot: Source, calibration_file: Path | None) -> list[Finding]:
+def _robot(path: Path, robot: Source, opener: Opener) -> list[Finding]:
     part = robot.name.lower()
     try:
-        recording = open_robot(path, robot, calibration_file)
+        recording = opener(path, robot)
         findings = [
+            *(Finding(part, "assumed", words, Verdict.NOTED) for words in recording.assumed),
             look_at_stamps(part, "images", recording.camera_stamps),
             _camera(part, recording),
             *_samples(part, recording),
@@ -135,14 +158,19 @@ def _camera(part: str, recording: RobotRecording) -> Finding:
 
 def _depth(part: str, recording: RobotRecording) -> Finding:
     last = len(recording.camera_stamps) - 1
-    known, middle = [], []
+    known, depths = [], []
     for index in np.unique(np.linspace(0, last, DEPTH_SAMPLES).astype(int)):
         image = recording.read_image(int(index))
         depth = image.depth  # type: ignore[union-attr]
         known.append(np.isfinite(depth).mean())
-        middle += [float(np.nanmedian(depth))] if known[-1] > 0 else []
-    share = float(np.mean(known))
+        depths.append(depth[np.isfinite(depth)])
+    share, depth_m = float(np.mean(known)), np.concatenate(depths)
     if share < MIN_DEPTH:
         return Finding(part, "depth", f"known for {100 * share:.0f} % of the pixels", Verdict.WRONG)
-    found = f"known for {100 * share:.0f} % of the pixels, median {np.median(middle):.2f} m"
+    found = f"known for {100 * share:.0f} % of the pixels, median {np.median(depth_m):.2f} m"
+    if not plausible(depth_m):
+        for factor, scales in MIXED_UP.items():
+            if plausible(depth_m * factor):
+                found += f"; it looks like {scales[0]} per metre read as {scales[1]}"
+                return Finding(part, "depth", found, Verdict.WRONG)
     return Finding(part, "depth", found)

@@ -13,7 +13,7 @@ from airground.core.messages import GroundImage
 from airground.core.se3 import SE3
 from airground.io.robot_recording import RobotRecording
 from evaluation.datasets.inspection.findings import Finding, Verdict
-from evaluation.datasets.inspection.photometric import SHIFT_PX, Posed, fits
+from evaluation.datasets.inspection.photometric import SHIFT_PX, Fit, Posed, fits
 from evaluation.table.tracked_share import TruePose
 from sim.recording.truth import Truth
 
@@ -28,6 +28,7 @@ are 10 px. Truth of a simulator has neither."""
 MIN_RISE = 1.05
 """Least rise of the difference over two pixels; with less, the images decide nothing."""
 MIN_KNOWN = 0.5
+MIRROR = np.diag([1.0, -1.0, 1.0])
 
 
 def look_at_truth(part: str, recording: RobotRecording, true_pose: TruePose | None) -> Finding:
@@ -46,7 +47,30 @@ def hold_truth_against_images(part: str, recording: RobotRecording, true_pose: T
     subject = "truth against images"
     if recording.robot == Source.MAV and recording.layout != "airground":
         return Finding(part, subject, "not checked: there is no depth", Verdict.NOTED)
-    camera = recording.calibration.camera
+    found = _fits(recording, true_pose)
+    if len(found) < MIN_FITS:
+        words = f"not checked: {len(found)} pairs of images show the same and move enough"
+        return Finding(part, subject, words, Verdict.NOTED)
+    offset = _offset_px(found)
+    verdict, hint = _verdict(offset, recording.layout), ""
+    if recording.layout != "airground" and verdict is not Verdict.FINE:
+        hint = _mirrored_hint(recording, true_pose)
+        verdict = Verdict.WRONG if hint else verdict
+    if np.isinf(offset):
+        words = f"the truth maps most of each image out of that {APART} images later"
+        return Finding(part, subject, words + hint, Verdict.WRONG)
+    rise = float(np.nanmedian([one.rise for one in found]))
+    if rise < MIN_RISE and offset <= MAX_OFFSET_PX:
+        return Finding(part, subject, "not checked: too little structure", Verdict.NOTED)
+    words = (
+        f"{offset:.2f} px off (median of {len(found)} pairs {APART} images apart); "
+        f"{SHIFT_PX:g} px beside, they fit {100 * (rise - 1):.0f} % worse"
+    )
+    return Finding(part, subject, words + hint, verdict)
+
+
+def _fits(recording: RobotRecording, true_pose: TruePose) -> list[Fit]:
+    """Fits of pairs of images, spread evenly over the recording."""
     last = len(recording.camera_stamps) - 1 - APART
     starts = np.unique(np.linspace(0, max(last, 0), PAIRS).astype(int)).tolist()
     pairs = [(i, i + APART) for i in starts if i + APART < len(recording.camera_stamps)]
@@ -59,22 +83,27 @@ def hold_truth_against_images(part: str, recording: RobotRecording, true_pose: T
         grey, depth = depth_of(index, T_world_camera)
         return Posed(grey, depth, T_world_camera)
 
-    found = fits(posed, pairs, camera)
-    if len(found) < MIN_FITS:
-        words = f"not checked: {len(found)} pairs of images show the same and move enough"
-        return Finding(part, subject, words, Verdict.NOTED)
-    offset = float(np.median([np.linalg.norm(one.offset_px) for one in found]))
-    if np.isinf(offset):
-        words = f"the truth maps most of each image out of that {APART} images later"
-        return Finding(part, subject, words, Verdict.WRONG)
-    rise = float(np.nanmedian([one.rise for one in found]))
-    if rise < MIN_RISE and offset <= MAX_OFFSET_PX:
-        return Finding(part, subject, "not checked: too little structure", Verdict.NOTED)
-    words = (
-        f"{offset:.2f} px off (median of {len(found)} pairs {APART} images apart); "
-        f"{SHIFT_PX:g} px beside, they fit {100 * (rise - 1):.0f} % worse"
+    return fits(posed, pairs, recording.calibration.camera)
+
+
+def _offset_px(found: list[Fit]) -> float:
+    return float(np.median([np.linalg.norm(one.offset_px) for one in found]))
+
+
+def _mirrored_hint(recording: RobotRecording, true_pose: TruePose) -> str:
+    """Words for a truth that fits once its y axis points the other way; else nothing."""
+
+    def mirrored(stamp_ns: int) -> SE3 | None:
+        pose = true_pose(stamp_ns)
+        return pose and SE3(MIRROR @ pose.rotation @ MIRROR, MIRROR @ pose.translation)
+
+    found = _fits(recording, mirrored)
+    if len(found) < MIN_FITS or _offset_px(found) > MAX_OFFSET_PX:
+        return ""
+    return (
+        f"; mirrored it is {_offset_px(found):.2f} px off: its y axis points up, as ICL-NUIM's; "
+        "negate ty, qx and qz"
     )
-    return Finding(part, subject, words, _verdict(offset, recording.layout))
 
 
 def _verdict(offset_px: float, layout: str) -> Verdict:

@@ -10,10 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from airground.core.cloud import Source
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.errors import InputError
-from airground.io.tum import read_tum, write_tum
+from airground.io.open_recording import open_robot
+from airground.io.robot_recording import RobotRecording
+from airground.io.tum import format_stamp, read_tum, write_tum
 from evaluation import cli
 from evaluation.datasets.inspection import inspect_dataset as inspection
 from evaluation.datasets.inspection.findings import Finding, Rhythm, Verdict, look_at_stamps
@@ -111,7 +114,7 @@ def test_what_cannot_be_read_is_a_finding(small: Path, tmp_path: Path) -> None:
     (broken / "mav0" / "cam0" / "data.csv").unlink()
     _, findings = inspect_dataset(broken)
     assert wrong(findings) == [("", "readable")]
-    with pytest.raises(InputError, match="holds neither"):
+    with pytest.raises(InputError, match=r"holds no recording; expected .*a dataset of ours"):
         inspect_dataset(tmp_path)
 
 
@@ -140,12 +143,71 @@ def test_a_truth_that_carries_images_out_of_each_other_is_found(tum: Path) -> No
 
 def test_a_truth_in_other_axes_is_found(tum: Path) -> None:
     """The pose of a body with x forward, in place of a camera's."""
-    path = tum / "groundtruth.txt"
-    poses = read_tum(path)
     body = SE3(np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]), np.zeros(3))
-    changed = [poses[i] @ body for i in range(len(poses))]
-    write_tum(path, Trajectory.from_poses(poses.stamps_ns.tolist(), changed))
+    rewritten(tum, lambda T: T @ body)
     assert wrong(inspect_dataset(tum)[1]) == [("ground", "truth against images")]
+
+
+def rewritten(folder: Path, change: Callable[[SE3], SE3]) -> None:
+    """Every true pose, changed."""
+    path = folder / "groundtruth.txt"
+    poses = read_tum(path)
+    changed = [change(poses[i]) for i in range(len(poses))]
+    write_tum(path, Trajectory.from_poses(poses.stamps_ns.tolist(), changed))
+
+
+def test_a_mirrored_truth_is_named(tum: Path) -> None:
+    """ICL-NUIM's poses have a y axis that points up."""
+    mirror = np.diag([1.0, -1.0, 1.0])
+    rewritten(tum, lambda T: SE3(mirror @ T.rotation @ mirror, mirror @ T.translation))
+    found = of(inspect_dataset(tum)[1], "ground", "truth against images")
+    assert found.verdict is Verdict.WRONG
+    assert "mirrored it is 0." in found.found
+    assert found.found.endswith("negate ty, qx and qz")
+
+
+def test_another_depth_scale_than_stated_is_found(tum: Path) -> None:
+    def opener(path: Path, robot: Source) -> RobotRecording:
+        return open_robot(path, robot, depth_units_per_m=1000.0)
+
+    found = of(inspect_dataset(tum, opener)[1], "ground", "depth")
+    assert found.verdict is Verdict.WRONG
+    assert found.found.endswith("it looks like 5000 per metre read as 1000")
+
+
+def as_seven_scenes(tum: Path, folder: Path) -> Path:
+    """The same frames, numbered, with poses and depth in that form."""
+    folder.mkdir()
+    poses = read_tum(tum / "groundtruth.txt")
+    for number, stamp in enumerate(poses.stamps_ns.tolist()):
+        name = folder / f"frame-{number:06d}"
+        for kind, kept in (("rgb", "color.png"), ("depth", "depth.png")):
+            shutil.copy(tum / kind / f"{format_stamp(stamp)}.png", f"{name}.{kept}")
+        np.savetxt(f"{name}.pose.txt", poses[number].matrix())
+    yaml = (tum / "calibration.yaml").read_text()
+    (folder / "calibration.yaml").write_text(yaml + "depth_units_per_m: 5000\n")
+    return folder
+
+
+def test_a_seven_scenes_folder_is_inspected_with_its_truth(tum: Path, tmp_path: Path) -> None:
+    folder = as_seven_scenes(tum, tmp_path / "seq-01")
+    layout, findings = inspect_dataset(folder)
+    assert layout == "7scenes"
+    assert wrong(findings) == []
+    assert of(findings, "ground", "truth").found == "known for 100 % of the images"
+    assert "px off" in of(findings, "ground", "truth against images").found
+    (folder / "frame-000003.pose.txt").write_text("1 0 0 0\n0 1 0 0\n")
+    (_, message) = wrong(inspect_dataset(folder)[1])[0], inspect_dataset(folder)[1][-1].found
+    assert "frame-000003.pose.txt" in message
+
+
+def test_both_robots_of_a_bag_are_inspected(exported: Exported) -> None:
+    layout, findings = inspect_dataset(exported("mcap") / "recording")
+    assert layout == "ros"
+    assert wrong(findings) == []
+    for part in ("mav", "ground"):
+        assert of(findings, part, "images").found.startswith("21 at 30.0 Hz")
+    assert of(findings, "mav", "IMU").found.startswith("1001 at 200.0 Hz")
 
 
 def test_missing_images_are_counted(tum: Path) -> None:

@@ -13,8 +13,11 @@ import pytest
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
+from airground.core.cloud import Source
 from airground.core.se3 import SE3
+from airground.io.open_recording import open_robot
 from evaluation.datasets.simulated import Simulated
+from tests.evaluation.plain_recordings import content
 
 RERUN = Path(sysconfig.get_path("scripts")) / "rerun"
 Bag = dict[str, list[tuple[int, Any]]]
@@ -129,6 +132,23 @@ def test_odometry_moves_as_its_twist_says(bag: Bag) -> None:
         np.testing.assert_allclose(turned, rates, atol=3e-2)
         assert middle.header.frame_id == "world"
         assert middle.child_frame_id == f"{robot}/base_link"
+
+
+@pytest.mark.parametrize("robot", list(Source))
+def test_it_is_read_back_message_by_message(
+    folder: Path, simulated: Simulated, robot: Source
+) -> None:
+    """By the type of its topics: images, samples and calibration are those of the recording.
+    Stamps stay, and so does the bag's name of each robot."""
+    ours, back = simulated.recording.of(robot), open_robot(folder, robot)
+    pairs = zip(ours.messages(), back.messages(), strict=True)
+    for one, other in pairs:
+        assert type(one.message) is type(other.message)
+        for a, b in zip(content(one.message), content(other.message), strict=True):
+            np.testing.assert_array_equal(a, b)
+    assert ours.calibration.camera == back.calibration.camera
+    mounting = ours.calibration.T_imu_camera.matrix()
+    np.testing.assert_allclose(back.calibration.T_imu_camera.matrix(), mounting, atol=1e-12)
 
 
 @pytest.mark.skipif(not RERUN.exists(), reason="rerun's command is not installed")

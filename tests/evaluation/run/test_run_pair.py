@@ -6,7 +6,6 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import open3d as o3d
@@ -14,7 +13,6 @@ import pytest
 
 from airground.config import Config
 from airground.core.cloud import PointCloud, Source
-from airground.core.messages import GroundImage, ImuSamples, MagneticSamples, MavImage
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.errors import InputError, RecordingError
@@ -34,7 +32,7 @@ from evaluation.setup.setups import Given, Setup
 from sim.recording.recorder import record
 from sim.scene import load_scene
 from sim.sensors.presets import NOMINAL
-from tests.evaluation.plain_recordings import write_euroc_folder, write_tum_folder
+from tests.evaluation.plain_recordings import content, write_euroc_folder, write_tum_folder
 from tests.evaluation.show.scripted_run import ReadBack
 from tests.slam.synthetic_world import ground_sequence, mav_sequence
 
@@ -65,19 +63,6 @@ def exported(path: Path, out: Path) -> Pair:
         (out / name).mkdir()
         FORMATS[name].write(out / name, simulated, robots_for(name, None))
     return Pair(open_robot(out / "euroc", Source.MAV), open_robot(out / "tum", Source.GROUND))
-
-
-def content(message: Any) -> list[np.ndarray]:
-    match message:
-        case MavImage():
-            return [np.array(message.stamp_ns), message.image]
-        case GroundImage():
-            return [np.array(message.stamp_ns), message.colour, message.depth]
-        case ImuSamples():
-            return [message.stamps_ns, message.gyro, message.accelerometer]
-        case MagneticSamples():
-            return [message.stamps_ns, message.field]
-    raise TypeError(type(message))
 
 
 def test_an_export_is_read_back_message_by_message(small: Path, tmp_path: Path) -> None:
@@ -185,7 +170,10 @@ REFUSED: dict[str, tuple[list[str], str]] = {
     "oracle": (["--mav", "EUROC", "--ground", "TUM", "--poses", "oracle"], "--poses oracle: needs"),
     "drops": (["--mav", "EUROC", "--ground", "TUM", "--drops", "x.json"], "--drops: needs"),
     "swapped": (["--mav", "EUROC", "--ground", "EUROC"], "has no depth images"),
-    "calibration": (["EUROC", "--mav-calibration", "x.yaml"], "alone --mav-calibration"),
+    "calibration": (
+        ["EUROC", "--mav-calibration", "x.yaml"],
+        "alone --mav-calibration, --gro",
+    ),
 }
 
 
