@@ -36,8 +36,8 @@ class Room(Part):
     """Extent of the floor along x and y, centred on the origin [m]."""
     wall_height_m: NonNegative = 3.0
     """Height of the four walls; 0 leaves them out [m]."""
-    floor: Literal["concrete", "printed"] = "concrete"
-    """Worn concrete, or a flat print full of texture."""
+    floor: Literal["concrete", "plain", "printed"] = "concrete"
+    """Worn concrete, a plain covering of one colour, or a flat print full of texture."""
 
 
 class Rubble(Part):
@@ -59,6 +59,8 @@ class Rubble(Part):
     """0 drops boxes upright and aligned with the room, 1 in any orientation."""
     clearance_m: Positive = 0.45
     """No box comes closer to the ground robot's path than this [m]."""
+    printed: Fraction = 1.0
+    """Share of the boxes that carry print, labels and stickers; the others are plain board."""
     size_scale: Annotated[float, Field(ge=0.1, le=1.5)] = 1.0
     """Every box is so many times as large as drawn; so the heap is about so much higher."""
 
@@ -74,14 +76,22 @@ class Terrain(Part):
 
     relief_m: Positive = 0.35
     """Height between the lowest and the highest ground [m]."""
+    clods_m: Annotated[float, Field(ge=0, le=0.1)] = 0.0
+    """Height of clods of 10 to 16 cm on the ground, twice their standard deviation [m]."""
     rocks: Annotated[int, Field(ge=0, le=200)] = 60
     """How many rocks lie on it."""
     rock_m: tuple[Positive, Positive] = (0.15, 0.9)
     """Smallest and largest diameter of a rock [m]."""
+    rock_roughness_m: Annotated[float, Field(ge=0, le=0.03)] = 0.0
+    """Standard deviation of steps and hollows of about 8 cm on the rocks [m]."""
     area_m: tuple[Positive, Positive] = (6.0, 6.0)
     """Extent along x and y over which rocks lie, centred on the origin [m]."""
     clearance_m: Positive = 0.45
     """No rock comes closer to the ground robot's path than this [m]."""
+    stones_per_m2: Annotated[float, Field(ge=0, le=400)] = 0.0
+    """Small stones of 2 to 9 cm, which stand out of the ground [1/m^2]."""
+    plants_per_m2: Annotated[float, Field(ge=0, le=60)] = 0.0
+    """Low plants, each a rosette of leaves of 8 to 20 cm [1/m^2]."""
 
 
 class Light(Part):

@@ -76,6 +76,7 @@ def paint_face(
     kind: FaceKind,
     longest_px: int,
     rng: np.random.Generator,
+    printed: bool = True,
 ) -> Image:
     """The picture of one face, upright: rows go down, columns to the right.
 
@@ -85,6 +86,7 @@ def paint_face(
         kind: Kind of the face.
         longest_px: Pixels along the longer edge.
         rng: Source of the features of this face alone.
+        printed: Whether the face may carry print, labels and stickers.
 
     Returns:
         (H, W, 3) float32 display values, 0 to 255, unlit, in the face's proportion.
@@ -95,15 +97,17 @@ def paint_face(
     _board(sheet, make)
     if kind == "flaps":
         _flap_seam(sheet)
-        _flap_print(sheet, make)
+        if printed:
+            _flap_print(sheet, make)
         wear.tape_seam(sheet, make.tape)
     else:
-        _side_print(sheet, make)
+        if printed:
+            _side_print(sheet, make)
         if kind == "end":
             wear.tape_end(sheet, make.tape)
-    if rng.random() < (0.45 if kind == "flaps" else 0.3):
+    if printed and rng.random() < (0.45 if kind == "flaps" else 0.3):
         wear.shipping_label(sheet)
-    if rng.random() < 0.22:
+    if printed and rng.random() < 0.22:
         wear.sticker(sheet)
     wear.wear(sheet)
     return sheet.pixels

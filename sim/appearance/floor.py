@@ -1,4 +1,4 @@
-"""Pictures of a concrete floor, of plaster walls, and of a floor covered with print."""
+"""Pictures of floors (concrete, a plain covering, a print) and of plaster walls."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from sim.geometry.noise import Image, octave_noise, smooth_noise
 
 _CONCRETE: Colour = (154, 151, 145)
 _PLASTER: Colour = (196, 193, 184)
+_COVERING: Colour = (134, 138, 142)
 
 
 def paint_concrete(size_m: tuple[float, float], px_per_m: float, rng: np.random.Generator) -> Image:
@@ -26,6 +27,18 @@ def paint_concrete(size_m: tuple[float, float], px_per_m: float, rng: np.random.
     _arcs(sheet, 160, (0.05, 0.35), 0.38)
     _tape_and_paint(sheet, int(0.28 * np.prod(size_m)))
     _litter(sheet, int(5 * np.prod(size_m)))
+    return sheet.pixels
+
+
+def paint_plain(size_m: tuple[float, float], px_per_m: float, rng: np.random.Generator) -> Image:
+    """A covering of one colour, as in offices and laboratories: fine flecks, dirt, some scuffs."""
+    sheet = _blank(size_m, px_per_m, rng)
+    clouds = octave_noise(sheet.shape, 1.6 * px_per_m, 0.05 * px_per_m, rng, 0.7)
+    flecks = np.asarray(cv2.GaussianBlur(rng.standard_normal(sheet.shape, np.float32), (0, 0), 1.2))
+    tone = 1 + np.float32(0.025) * clouds + np.float32(0.12) * flecks.astype(np.float32)
+    sheet.pixels[:] = np.array(_COVERING, np.float32) * tone[..., None]
+    _spots(sheet, int(0.3 * np.prod(size_m)), (0.02, 0.12), 0.12)
+    _arcs(sheet, int(2 * np.prod(size_m)), (0.05, 0.5), 0.15)
     return sheet.pixels
 
 

@@ -14,9 +14,12 @@ _SOILS: tuple[Colour, ...] = ((124, 102, 78), (166, 146, 116), (98, 84, 66))
 _GRASSES: tuple[Colour, ...] = (
     (150, 140, 84), (176, 160, 104), (116, 122, 62), (92, 104, 50), (192, 176, 126), (134, 120, 74),
 )  # fmt: skip
-_STONES: tuple[Colour, ...] = (
+STONES: tuple[Colour, ...] = (
     (150, 146, 140), (122, 116, 110), (172, 166, 154), (140, 124, 106), (98, 94, 92),
     (186, 178, 170),
+)  # fmt: skip
+LEAF_GREENS: tuple[Colour, ...] = (
+    (106, 122, 62), (88, 108, 54), (126, 134, 74), (140, 132, 78), (112, 116, 72),
 )  # fmt: skip
 _LEAVES: tuple[Colour, ...] = ((146, 92, 44), (120, 74, 40), (172, 124, 60), (98, 66, 40))
 _LATTICE = 32  # a power of two: cells are wrapped by their bits
@@ -88,13 +91,13 @@ def _pebbles(
     rotation = np.stack([np.stack([c, -s], -1), np.stack([s, c], -1)], 1)
     outline = np.einsum("nij,nkj->nki", rotation, outline) + places[:, None]
     tones = rng.uniform(0.72, 1.12, count)
-    kinds = rng.integers(len(_STONES), size=count)
+    kinds = rng.integers(len(STONES), size=count)
     shift = 0.35 * radii[:, None, None] * sun
     shadows = fixed_point(outline - shift)
     cores = fixed_point(places[:, None] + shift + 0.55 * (outline - places[:, None]))
     bodies = fixed_point(outline)
     for i in range(count):
-        colour = np.array(_STONES[kinds[i]]) * tones[i]
+        colour = np.array(STONES[kinds[i]]) * tones[i]
         cv2.fillConvexPoly(canvas, shadows[i], (52, 44, 36), cv2.LINE_AA, 3)
         cv2.fillConvexPoly(canvas, bodies[i], tuple(colour * 0.86), cv2.LINE_AA, 3)
         if radii[i] > 2:
@@ -158,24 +161,24 @@ def paint_rock(nodes: NDArray, diameter_m: float, rng: np.random.Generator) -> I
     `nodes` (..., 3) lie on the rock [m], in any frame; `diameter_m` sets the size of the mottles.
     """
     points = nodes.reshape(-1, 3)
-    coarse = _noise_in_space(points, 0.3 * diameter_m, rng)
-    middle = _noise_in_space(points, 0.035, rng)
-    fine = _noise_in_space(points, 0.009, rng)
-    grain = _noise_in_space(points, 0.0035, rng)
+    coarse = noise_in_space(points, 0.3 * diameter_m, rng)
+    middle = noise_in_space(points, 0.035, rng)
+    fine = noise_in_space(points, 0.009, rng)
+    grain = noise_in_space(points, 0.0035, rng)
     tone = 1 + 0.07 * coarse + 0.08 * middle + 0.09 * fine + 0.09 * grain
-    crack = np.abs(_noise_in_space(points, 0.12, rng) + 0.25 * middle)
+    crack = np.abs(noise_in_space(points, 0.12, rng) + 0.25 * middle)
     tone *= 1 - 0.45 * np.exp(-((crack / 0.035) ** 2))
     pits = np.clip(fine + 0.6 * grain - 1.5, 0, 0.6)
     tone *= 1 - 0.5 * pits
     colour = np.array(_ROCKS[rng.integers(len(_ROCKS))]) * rng.uniform(0.82, 1.08)
     pixels = colour.astype(np.float32) * tone[:, None]
-    lichen = np.clip(3 * (_noise_in_space(points, 0.05, rng) + 0.5 * fine - 1.15), 0, 0.75)
+    lichen = np.clip(3 * (noise_in_space(points, 0.05, rng) + 0.5 * fine - 1.15), 0, 0.75)
     patch = ((196, 192, 150), (168, 164, 96), (204, 204, 196))[rng.integers(3)]
     pixels += (np.array(patch) * (1 + 0.06 * grain)[:, None] - pixels) * lichen[:, None]
     return pixels.reshape(nodes.shape).astype(np.float32)
 
 
-def _noise_in_space(points: NDArray, cell_m: float, rng: np.random.Generator) -> NDArray:
+def noise_in_space(points: NDArray, cell_m: float, rng: np.random.Generator) -> NDArray:
     """(N,) of about unit deviation, varying over `cell_m` in every direction."""
     lattice = rng.standard_normal((_LATTICE,) * 3, np.float32)
     return 1.6 * _interpolate(lattice, (points / cell_m).astype(np.float32))

@@ -49,31 +49,43 @@ def paint_boxes(
     boxes: tuple[Box, ...],
     makes: list[Make],
     texture: float,
+    printed: float,
     baker: LightBaker,
     rng: np.random.Generator,
 ) -> list[NDArray[np.uint8]]:
-    """The lit cube picture (6 side, side, 3) of every box; `texture` is its contrast."""
+    """The lit cube picture (6 side, side, 3) of every box.
+
+    `texture` is its contrast, and `printed` the share of boxes with print.
+    """
     if not boxes:
         return []
     light = _face_light(boxes, baker)
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
         jobs = [
-            pool.submit(_cube_picture, box, makes[box.make], texture, light[i], own)
+            pool.submit(_cube_picture, box, makes[box.make], texture, printed, light[i], own)
             for i, (box, own) in enumerate(zip(boxes, rng.spawn(len(boxes)), strict=True))
         ]
         return [job.result() for job in jobs]
 
 
 def _cube_picture(
-    box: Box, make: Make, texture: float, light: NDArray[np.float32], rng: np.random.Generator
+    box: Box,
+    make: Make,
+    texture: float,
+    printed: float,
+    light: NDArray[np.float32],
+    rng: np.random.Generator,
 ) -> NDArray[np.uint8]:
     side = _resolution(box.size_m)
+    # Drawn apart: the same box is printed or not whatever is painted on it.
+    has_print = bool(rng.spawn(1)[0].random() < printed)
     cube = np.empty((6 * side, side, 3), np.uint8)
     for index, (normal, columns, rows) in enumerate(CUBE_FACES):
         right, down = _upright(normal)
         size = tuple(float(np.abs(axis) @ box.size_m) for axis in (right, down))
         kind: FaceKind = "flaps" if normal[2] else "end" if normal[0] else "side"
-        pixels = faded(paint_face(make, (size[0], size[1]), kind, side, rng), texture)
+        painted = paint_face(make, (size[0], size[1]), kind, side, rng, has_print)
+        pixels = faded(painted, texture)
         turned = np.ascontiguousarray(np.rot90(pixels, _quarter_turns(right, down, columns, rows)))
         light_up(turned, light[index], cube[index * side : (index + 1) * side])
     return cube

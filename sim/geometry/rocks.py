@@ -31,6 +31,8 @@ PATCHES = np.array(
 _PLANES = 12
 _CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / np.sqrt(3)
 _CLOSING = np.concatenate([_CORNERS, np.eye(3), -np.eye(3)])
+ROUGHNESS_CELL_M = 0.04
+"""Size of steps and hollows of a rough rock: two cells of a mesh of the largest rocks [m]."""
 _ROUNDNESS = 14  # exponent of the smooth minimum over planes: the higher, the sharper
 
 
@@ -80,7 +82,7 @@ def scatter_rocks(scene: Scene, ground: HeightField, rng: np.random.Generator) -
     rocks: list[Rock] = []
     places: list[NDArray] = []
     for diameter in np.sort(diameters)[::-1]:
-        vertices = _shape(diameter, rng)
+        vertices = _shape(diameter, rng, terrain.rock_roughness_m)
         reach = float(np.linalg.norm(vertices[..., :2], axis=-1).max())
         for place in rng.uniform(-half, half, (60, 2)):
             off_lane = np.linalg.norm(lane - place, axis=1).min() - reach
@@ -101,7 +103,7 @@ def cube_directions(n: int) -> NDArray[np.float64]:
     return out + t[None, None, :, None] * right + t[None, :, None, None] * down
 
 
-def _shape(diameter: float, rng: np.random.Generator) -> NDArray[np.float64]:
+def _shape(diameter: float, rng: np.random.Generator, roughness_m: float) -> NDArray[np.float64]:
     """(6, n, n, 3) nodes around the origin [m]."""
     n = 10 if diameter < 0.25 else 14 if diameter < 0.5 else 20
     directions = cube_directions(n)
@@ -120,4 +122,17 @@ def _shape(diameter: float, rng: np.random.Generator) -> NDArray[np.float64]:
     stretch = rng.uniform([0.8, 0.65, 0.5], [1.15, 0.95, 0.8])
     turn = Rotation.from_euler("zyx", [rng.uniform(0, 2 * np.pi), *rng.normal(0, 0.25, 2)])
     nodes = directions * radius[..., None] * stretch * diameter / 2
+    if roughness_m > 0:
+        nodes += directions * _roughness(nodes, roughness_m, rng)[..., None]
     return turn.apply(nodes.reshape(-1, 3)).reshape(nodes.shape)
+
+
+def _roughness(nodes: NDArray, height_m: float, rng: np.random.Generator) -> NDArray[np.float64]:
+    """(6, n, n) steps and hollows on nodes (6, n, n, 3), with this deviation [m]."""
+    cells = nodes.reshape(-1, 3) / ROUGHNESS_CELL_M
+    (own,) = rng.spawn(1)  # drawn apart: shapes and places stay
+    lattice = own.standard_normal((32, 32, 32))
+    steps = map_coordinates(
+        lattice, cells.T + own.uniform(0, 32, (3, 1)), order=1, mode="grid-wrap"
+    )
+    return np.asarray(height_m * (steps / np.std(steps)).reshape(nodes.shape[:3]))

@@ -14,6 +14,10 @@ from sim.geometry.surface import Mesh
 CELL_M = 0.04
 # Wavelength [m] and share of the relief: hills, hummocks, tufts, clods.
 _WAVES = ((4.0, 1.0), (1.6, 0.45), (0.6, 0.14), (0.24, 0.05))
+CLOD_CELL_M = 0.025
+"""Cell of ground with clods: four to a clod [m]."""
+_CLODS_M = (0.16, 0.1)
+"""Wavelengths of clods, as of ground that was dug or trodden [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +71,7 @@ class HeightField:
 
     def normals(self, x: NDArray, y: NDArray) -> NDArray[np.float64]:
         """(N, 3) unit normals of the smoothed ground at x, y (N,)."""
-        step = CELL_M
+        step = self.size_m[0] / (self.heights.shape[0] - 1)
         half = self.size_m / 2 - 1e-9
         left, right = np.clip(x - step, -half[0], half[0]), np.clip(x + step, -half[0], half[0])
         low, high = np.clip(y - step, -half[1], half[1]), np.clip(y + step, -half[1], half[1])
@@ -78,14 +82,21 @@ class HeightField:
 
 
 def make_terrain(
-    size_m: tuple[float, float], relief_m: float, rng: np.random.Generator
+    size_m: tuple[float, float], relief_m: float, clods_m: float, rng: np.random.Generator
 ) -> HeightField:
-    """Ground whose highest and lowest points lie `relief_m` apart; the origin is at z = 0."""
-    nodes = (_odd(size_m[0] / CELL_M), _odd(size_m[1] / CELL_M))
+    """Ground whose highest and lowest points lie `relief_m` apart; the origin is at z = 0.
+
+    `clods_m` is twice the standard deviation of clods on top of that.
+    """
+    cell_m = CLOD_CELL_M if clods_m > 0 else CELL_M
+    nodes = (_odd(size_m[0] / cell_m), _odd(size_m[1] / cell_m))
     heights = np.zeros(nodes)
     for wavelength, share in _WAVES:
-        heights += share * smooth_noise(nodes, wavelength / CELL_M / 2, rng)
+        heights += share * smooth_noise(nodes, wavelength / cell_m / 2, rng)
     heights *= relief_m / np.ptp(heights)
+    if clods_m > 0:
+        clods = sum(smooth_noise(nodes, wavelength / cell_m / 2, rng) for wavelength in _CLODS_M)
+        heights += clods * (clods_m / 2 / np.std(clods))
     heights -= heights[nodes[0] // 2, nodes[1] // 2]
     return HeightField(heights, np.array(size_m))
 

@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.appearance.bake_light import LightBaker
+from sim.appearance.cover_picture import PATCH_PX, lit_patches
 from sim.appearance.ground_picture import paint_ground, paint_rock
 from sim.appearance.pictures import add_picture
 from sim.appearance.sheet import faded, light_up
+from sim.geometry.ground_cover import GroundCover
 from sim.geometry.noise import Image
 from sim.geometry.rocks import Rock
 from sim.geometry.surface import Mesh
@@ -20,6 +22,8 @@ from sim.scene import Scene
 GROUND_PX_PER_M = 420.0
 ROCK_PX_PER_M = 450.0
 LIGHT_CELL_M = 0.025
+COVER_LIGHT_CELL_M = 0.0125
+"""Light of the ground where small stones and plants throw shadows [m]: about half a stone."""
 _PLAIN_GROUND = (0.55, 0.48, 0.38, 1)
 _PLAIN_ROCK = (0.55, 0.54, 0.52, 1)
 
@@ -37,7 +41,10 @@ def add_ground(
         painted = paint_ground(size, GROUND_PX_PER_M, scene.light.azimuth_deg, rng)
         unlit = faded(painted, scene.texture)
         picture = np.empty(unlit.shape, np.uint8)
-        light_up(unlit, _ground_light(ground, baker), picture)
+        terrain = scene.terrain
+        covered = terrain is not None and terrain.stones_per_m2 + terrain.plants_per_m2 > 0
+        cell_m = COVER_LIGHT_CELL_M if covered else LIGHT_CELL_M
+        light_up(unlit, _ground_light(ground, baker, cell_m), picture)
         add_picture(spec, "ground", picture, cube=False)
     coordinates = ground.picture_coordinates()
     _add_mesh(spec, "ground", ground.mesh(), coordinates, _PLAIN_GROUND, baker is not None)
@@ -58,6 +65,43 @@ def add_rocks(
             add_picture(spec, rock.name, picture, cube=False)
         coordinates = _rock_coordinates(rock.vertices.shape[1], side)
         _add_mesh(spec, rock.name, rock.mesh(), coordinates, _PLAIN_ROCK, baker is not None)
+
+
+def add_cover(
+    spec: mujoco.MjSpec,
+    cover: GroundCover,
+    texture: float,
+    baker: LightBaker | None,
+    rng: np.random.Generator,
+) -> None:
+    """Add small stones and plants as one mesh with one picture, a tile for each patch."""
+    shapes = [patches.shape[:3] for patches in cover.patches()]
+    count = sum(shape[0] for shape in shapes)
+    if count == 0:
+        return
+    columns = int(np.ceil(np.sqrt(count)))
+    if baker:
+        tiles = np.zeros((columns * columns, PATCH_PX, PATCH_PX, 3), np.uint8)
+        tiles[:count] = lit_patches(cover, texture, baker, rng)
+        rows = tiles.reshape(columns, columns, PATCH_PX, PATCH_PX, 3).swapaxes(1, 2)
+        side = columns * PATCH_PX
+        add_picture(spec, "cover", rows.reshape(side, side, 3), cube=False)
+    coordinates = _cover_coordinates(shapes, columns)
+    _add_mesh(spec, "cover", cover.mesh(), coordinates, _PLAIN_ROCK, baker is not None)
+
+
+def _cover_coordinates(shapes: list[tuple[int, ...]], columns: int) -> NDArray[np.float64]:
+    """(V, 2) texture coordinates of groups of patches, (count, nodes down, nodes right) each.
+    Nodes on a rim lie half a pixel inside their tile."""
+    coordinates, first = [], 0
+    for count, *nodes in shapes:
+        inside = [(0.5 + np.linspace(0, PATCH_PX - 1, n)) / PATCH_PX for n in nodes]
+        v, u = np.meshgrid(*inside, indexing="ij")
+        tiles = np.divmod(np.arange(first, first + count), columns)
+        row, column = (index[:, None, None] for index in tiles)
+        coordinates.append(np.stack([column + u, row + v], axis=-1).reshape(-1, 2) / columns)
+        first += count
+    return np.concatenate(coordinates)
 
 
 def _add_mesh(
@@ -87,9 +131,9 @@ def _add_mesh(
     )
 
 
-def _ground_light(ground: HeightField, baker: LightBaker) -> Image:
+def _ground_light(ground: HeightField, baker: LightBaker, cell_m: float) -> Image:
     """(rows, columns, 3) light factors over the whole field, the first row at the largest y."""
-    columns, rows = (int(np.ceil(side / LIGHT_CELL_M)) for side in ground.size_m)
+    columns, rows = (int(np.ceil(side / cell_m)) for side in ground.size_m)
     x = ((np.arange(columns) + 0.5) / columns - 0.5) * ground.size_m[0]
     y = (0.5 - (np.arange(rows) + 0.5) / rows) * ground.size_m[1]
     x, y = (grid.ravel() for grid in np.meshgrid(x, y))

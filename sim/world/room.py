@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.appearance.bake_light import LightBaker
-from sim.appearance.floor import paint_concrete, paint_plaster, paint_print
+from sim.appearance.floor import paint_concrete, paint_plain, paint_plaster, paint_print
 from sim.appearance.pictures import add_picture
 from sim.appearance.sheet import faded, light_up
 from sim.geometry.noise import Image
@@ -19,6 +19,7 @@ FLOOR_PX_PER_M = 480.0
 WALL_PX_PER_M = 300.0
 FLOOR_LIGHT_CELL_M = 0.025
 WALL_LIGHT_CELL_M = 0.1  # no box stands close enough for its shadow to have an edge there
+PAINTED_FLOORS = {"concrete": paint_concrete, "plain": paint_plain, "printed": paint_print}
 COLLISION_GROUP = 3
 """Geoms of this group collide and are never drawn."""
 
@@ -61,7 +62,7 @@ def _add_floor(
     """One picture over the whole floor, so that nothing repeats and no seam shows."""
     half = np.array(room.size_m) / 2
     if baker:
-        paint = paint_concrete if room.floor == "concrete" else paint_print
+        paint = PAINTED_FLOORS[room.floor]
         right, up = np.array([half[0], 0, 0]), np.array([0, half[1], 0])
         light = _light_map(baker, np.zeros(3), right, up, FLOOR_LIGHT_CELL_M)
         pixels = faded(paint(room.size_m, FLOOR_PX_PER_M, rng), texture)

@@ -14,12 +14,13 @@ from sim.appearance.bake_light import LightBaker
 from sim.appearance.cardboard import Make
 from sim.appearance.pictures import add_picture, paint_boxes
 from sim.appearance.print_marks import BRANDS
+from sim.geometry.ground_cover import grow_cover
 from sim.geometry.rocks import scatter_rocks
 from sim.geometry.rubble import Box, make_heap
 from sim.geometry.surface import Mesh, box_mesh, join
 from sim.geometry.terrain import HeightField, make_terrain
 from sim.scene import Scene, Terrain
-from sim.world.outdoor import add_ground, add_rocks
+from sim.world.outdoor import add_cover, add_ground, add_rocks
 from sim.world.room import add_room, room_mesh
 
 # Mean linear reflectance of what bounces light.
@@ -98,14 +99,16 @@ def _build_outdoor(
     picture_rng: np.random.Generator,
     pictures: bool,
 ) -> World:
-    ground = make_terrain(scene.room.size_m, terrain.relief_m, geometry_rng)
+    ground = make_terrain(scene.room.size_m, terrain.relief_m, terrain.clods_m, geometry_rng)
     rocks = scatter_rocks(scene, ground, geometry_rng)
-    rock_meshes = [rock.mesh() for rock in rocks]
+    cover = grow_cover(terrain, ground, geometry_rng)
+    things = [rock.mesh() for rock in rocks] + [cover.mesh()]
     spec = _empty_spec(pictures)
-    baker = _baker(scene, ground.mesh(), rock_meshes, _SOIL, _STONE) if pictures else None
+    baker = _baker(scene, ground.mesh(), things, _SOIL, _STONE) if pictures else None
     add_ground(spec, ground, scene, baker, picture_rng)
     add_rocks(spec, rocks, scene.texture, baker, picture_rng)
-    return World(scene, seed, spec, *join([ground.mesh(), *rock_meshes]), (), ground)
+    add_cover(spec, cover, scene.texture, baker, picture_rng)
+    return World(scene, seed, spec, *join([ground.mesh(), *things]), (), ground)
 
 
 def _baker(
@@ -147,7 +150,7 @@ def _add_boxes(
     if baker and scene.rubble:
         names = rng.permutation(BRANDS)
         makes = [Make.draw(rng, str(names[k % len(names)])) for k in range(scene.rubble.makes)]
-        pictures = paint_boxes(boxes, makes, scene.texture, baker, rng)
+        pictures = paint_boxes(boxes, makes, scene.texture, scene.rubble.printed, baker, rng)
         for box, picture in zip(boxes, pictures, strict=True):
             add_picture(spec, box.name, picture, cube=True)
     for box in boxes:

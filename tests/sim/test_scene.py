@@ -8,7 +8,8 @@ from sim.robots.overlap import overlap_along_flight
 from sim.scene import load_scene, parse_scene, scene_names
 from sim.world.world import build_world
 
-SHIPPED = ["flat", "indoor_a", "indoor_b", "indoor_c", "outdoor", "tiny"]
+PAPER = ["paper_a", "paper_b", "paper_c", "paper_outdoor"]
+SHIPPED = ["flat", "indoor_a", "indoor_b", "indoor_c", "outdoor", *PAPER, "tiny"]
 
 SMALL = """
 name = "small"

@@ -7,6 +7,7 @@ import pytest
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from sim.appearance.bake_light import LightBaker
+from sim.appearance.floor import paint_concrete, paint_plain
 from sim.appearance.pictures import CUBE_FACES, add_picture
 from sim.geometry.surface import box_mesh, join, rectangle_mesh
 from sim.recording.render import Renderer, with_cameras
@@ -107,3 +108,22 @@ def test_light_falls_off_in_shadow_and_is_soft_at_its_edge() -> None:
     edge = (x > -1.0) & (x < -0.5)
     between = (shade[edge] > deepest * 1.1) & (shade[edge] < 0.93)
     assert between.sum() > 4
+
+
+def test_plain_boxes_carry_less_ink_and_their_shapes_stay() -> None:
+    def with_print(share: float) -> Scene:
+        scene = small()
+        rubble = scene.rubble.model_copy(update={"printed": share})
+        return scene.model_copy(update={"rubble": rubble})
+
+    whole, part = build_world(small(), 5), build_world(with_print(0.0), 5)
+    assert whole.vertices.tobytes() == part.vertices.tobytes()
+    assert textures(build_world(with_print(1.0), 5)) == textures(whole)
+    dark = [np.mean(np.frombuffer(textures(world), np.uint8) < 60) for world in (part, whole)]
+    assert dark[0] < 0.8 * dark[1]
+
+
+def test_a_plain_floor_has_less_contrast_than_concrete() -> None:
+    rng = np.random.default_rng(0)
+    plain, concrete = (paint((2.0, 2.0), 240.0, rng) for paint in (paint_plain, paint_concrete))
+    assert plain.std() < 0.6 * concrete.std()

@@ -79,6 +79,31 @@ DIALS = (
         lambda subject, value: _scene(subject, texture=value),
     ),
     Dial(
+        "scene.printed", "", 0.0, 1.0,
+        "share of the boxes with print, labels and stickers; the others are plain board",
+        lambda subject, value: _part(subject, "rubble", printed=value),
+    ),
+    Dial(
+        "scene.plants", "1/m²", 0.0, 60.0,
+        "low plants per square metre of natural ground",
+        lambda subject, value: _part(subject, "terrain", plants_per_m2=value),
+    ),
+    Dial(
+        "scene.stones", "1/m²", 0.0, 400.0,
+        "small stones per square metre of natural ground",
+        lambda subject, value: _part(subject, "terrain", stones_per_m2=value),
+    ),
+    Dial(
+        "scene.clods", "m", 0.0, 0.1,
+        "height of clods on natural ground",
+        lambda subject, value: _part(subject, "terrain", clods_m=value),
+    ),
+    Dial(
+        "scene.rock_roughness", "m", 0.0, 0.03,
+        "standard deviation of steps and hollows on rocks",
+        lambda subject, value: _part(subject, "terrain", rock_roughness_m=value),
+    ),
+    Dial(
         "sensors.noise", "", 0.0, 10.0,
         "factor of the noise of images, depth and inertial sensors",
         lambda subject, value: replace(subject, sensors=with_noise(subject.sensors, value)),

@@ -86,6 +86,19 @@ def test_a_scene_without_boxes_has_no_dials_for_them() -> None:
         turned(flat, {"scene.heap_height": 0.5})
 
 
+def test_dials_of_natural_ground_turn_what_they_name() -> None:
+    point = {
+        "scene.plants": 30.0,
+        "scene.stones": 100.0,
+        "scene.clods": 0.03,
+        "scene.rock_roughness": 0.01,
+    }
+    terrain = turned(replace(SUBJECT, scene=load_scene("outdoor")), point).scene.terrain
+    assert terrain is not None
+    assert (terrain.plants_per_m2, terrain.stones_per_m2) == (30.0, 100.0)
+    assert (terrain.clods_m, terrain.rock_roughness_m) == (0.03, 0.01)
+
+
 def test_dials_turn_what_they_name() -> None:
     point = {
         "scene.overlap": 0.6,
@@ -94,15 +107,18 @@ def test_dials_turn_what_they_name() -> None:
         "scene.flight_height": 3.0,
         "scene.camera_height": 1.0,
         "scene.texture": 0.2,
+        "scene.printed": 0.4,
         "sensors.noise": 2.0,
         "sensors.heading_error_deg": 5.0,
         "height_maps.cells_per_m": 50.0,
     }
-    assert {dial.name for dial in DIALS} < point.keys()
+    of_terrain = {"scene.plants", "scene.stones", "scene.clods", "scene.rock_roughness"}
+    assert {dial.name for dial in DIALS} - of_terrain < point.keys()
     subject = turned(SUBJECT, point)
     scene = subject.scene
     assert scene.rubble is not None
     assert (scene.rubble.self_similarity, scene.rubble.size_scale) == (0.3, 0.5)
+    assert scene.rubble.printed == 0.4
     assert (scene.ground.stop_at_overlap, scene.ground.camera_height_m) == (0.6, 1.0)
     assert (scene.mav.height_m, scene.texture) == (3.0, 0.2)
     assert subject.config.height_maps.cells_per_m == 50.0
@@ -115,8 +131,11 @@ def test_dials_turn_what_they_name() -> None:
 
 @pytest.mark.parametrize("dial", DIALS, ids=lambda dial: dial.name)
 def test_both_ends_of_a_range_are_allowed(dial: object) -> None:
+    outdoors = replace(SUBJECT, scene=load_scene("outdoor"))
+    natural = ("plants", "stones", "clods", "rock_roughness")
+    subject = outdoors if dial.name.endswith(natural) else SUBJECT  # type: ignore[attr-defined]
     for value in (dial.low, dial.high):  # type: ignore[attr-defined]
-        scene = turned(SUBJECT, {dial.name: value}).scene  # type: ignore[attr-defined]
+        scene = turned(subject, {dial.name: value}).scene  # type: ignore[attr-defined]
         assert type(scene).model_validate(scene.model_dump()) == scene
 
 
