@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from airground.core.arrays import F64, I64
 from airground.slam.front_end import ScaleEstimate
 from airground.slam.inertial.alignment import VisualNoise
 from airground.slam.inertial.scale_filter import ScaleFilter
@@ -11,19 +12,23 @@ from airground.slam.inertial.stationarity import gravity_aligned
 from airground.slam.keyframe_slam import KeyframeSlam
 from airground.slam.tight_scale import UNKNOWN_TILT, pose_sigma
 
-SETTLING_S = 5.0
-"""Motion that the filter must see before its result is used [s]."""
+SETTLING_S = 4.0
+"""Motion that the filter must see before its result is used [s]: a take-off, which takes 3 s,
+and the first way along the ground."""
 FILTER_TILT = np.deg2rad(1.0)
 """Standard deviation of the filter's vertical, in simulation [rad]."""
 GIVE_OUT_SIGMA = 0.03
-"""Poses are given out when the scale is known this well [share]; more takes half a minute."""
+"""Poses are given out when the scale is known this well [share]."""
+WORTH_MOVING = 0.01
+"""The map follows the filter's scale when it differs by this share."""
 
 
 class FilteredScale:
     """Loosely coupled: vision alone makes the map, the filter gives its unit and vertical.
 
-    The map is scaled once, when the scale is known; later corrections would tear apart what
-    was built on it.
+    The map is scaled and turned when the scale is known, and scaled again as the filter learns
+    more. The newest camera keeps its place then, and in adjustments of the whole map, so that
+    nothing that is being built on it is torn.
 
     Attributes:
         estimate: How well the scale is known; None before the first inertial motion.
@@ -36,29 +41,73 @@ class FilteredScale:
         self.known = slam.calibration.imu is None
         self.tilt_sigma = UNKNOWN_TILT
         self._slam = slam
-        self._filter: ScaleFilter | None = None
-        self._first_ns = self._last_ns = 0
+        self._filter = None if self.known else ScaleFilter(slam.T_rig_camera)
+        self._first_ns: int | None = None
+        self._last_ns = 0
+        self._seen: tuple[I64, F64] | None = None
 
     def update(self, tracked: bool) -> bool:
         """Take in the newest image, which gave a pose or not; returns whether the map was moved."""
         slam = self._slam
-        if self.known or not tracked or slam.stamp_ns is None:
+        if self._filter is None or not tracked or slam.stamp_ns is None:
             return False
-        stamp_ns, pose = slam.stamp_ns, slam.T_map_camera()
-        if self._filter is None:
-            self._filter = ScaleFilter(slam.T_rig_camera, VisualNoise(pose_sigma(slam)))
-            self._first_ns, motion = stamp_ns, None
+        self._stay()
+        self._learn(self._filter, slam.stamp_ns)
+        moved = self._follow(self._filter, slam.stamp_ns)
+        ids = slam.tracker.ids[slam.map.mapped(slam.tracker.ids)]
+        self._seen = ids, slam.map.positions[ids]
+        return moved
+
+    def _stay(self) -> None:
+        """Where the whole map was adjusted: the view keeps its place and depth, the past moves."""
+        slam = self._slam
+        before = slam.moved_from
+        if before is None or self._seen is None:
+            return
+        ids, old = self._seen
+        after = slam.T_map_camera()
+        kept = slam.map.mapped(ids)
+        depths = [
+            (T.inverse() @ points[kept])[:, 2]
+            for T, points in ((before, old), (after, slam.map.positions[ids]))
+        ]
+        if kept.sum() < slam.parameters.min_points:
+            return
+        slam.move_about(
+            before, float(np.median(depths[0] / depths[1])), before.rotation @ after.rotation.T
+        )
+
+    def _learn(self, scale_filter: ScaleFilter, stamp_ns: int) -> None:
+        """Feed the filter with the newest image and the motion that led to it."""
+        slam = self._slam
+        motion = None
+        if self._first_ns is None:
+            self._first_ns = stamp_ns
         else:
             motion = slam.motion.preintegrate(self._last_ns, stamp_ns, slam.state)
         self._last_ns = stamp_ns
-        self._filter.add(slam.state.rotation, pose.translation, motion)
-        sigma = self._filter.sigma
-        self.estimate = ScaleEstimate(sigma, self._filter.observable)
+        centre, noise = slam.T_map_camera().translation, VisualNoise(pose_sigma(slam))
+        scale_filter.add(slam.state.rotation, centre, noise, motion)
+        self.estimate = ScaleEstimate(scale_filter.sigma, scale_filter.observable)
+
+    def _follow(self, scale_filter: ScaleFilter, stamp_ns: int) -> bool:
+        """Give the map the filter's unit and vertical, where both are known and differ."""
+        slam, gravity = self._slam, scale_filter.gravity
+        assert self._first_ns is not None
         settled = (stamp_ns - self._first_ns) * 1e-9 >= SETTLING_S
-        gravity = self._filter.gravity
-        if not settled or sigma > GIVE_OUT_SIGMA or gravity is None:
+        if not settled or scale_filter.sigma > GIVE_OUT_SIGMA or gravity is None:
             return False
-        right = slam.map.keyframes[0].state.rotation @ slam.T_rig_camera.rotation[:, 0]
-        slam.make_upright(self._filter.scale, gravity_aligned(-gravity, right))
-        self.known, self.tilt_sigma = True, FILTER_TILT
+        scale, here = scale_filter.scale, slam.T_map_camera()
+        if not self.known:
+            right = slam.map.keyframes[0].state.rotation @ slam.T_rig_camera.rotation[:, 0]
+            turn = gravity_aligned(-gravity, right)
+            slam.make_upright(scale, turn)
+            scale_filter.follow(scale, turn, np.zeros(3), np.zeros(3))
+            self.known, self.tilt_sigma = True, FILTER_TILT
+            return True
+        if abs(np.log(scale)) < WORTH_MOVING:
+            return False
+        slam.move_about(here, scale, np.eye(3))
+        scale_filter.follow(scale, np.eye(3), here.translation, here.translation)
         return True
+

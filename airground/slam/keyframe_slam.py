@@ -57,6 +57,8 @@ class KeyframeSlam:
         inertial: Whether the map is metric and gravity-aligned and the velocity known, so
             that the accelerometer counts.
         metric: Whether the map's unit is the metre.
+        moved_from: Pose of the newest image before it made the whole map be adjusted; None where
+            it did not.
     """
 
     def __init__(
@@ -90,6 +92,7 @@ class KeyframeSlam:
         self._keyframe_covariance = np.zeros((6, 6))
         self._doubt: Doubt | None = None
         self._torn = self._adrift = False
+        self.moved_from: SE3 | None = None
         self.path.clear()
         own = self.camera, self.T_rig_camera, self.parameters
         self.adjuster = MapAdjuster(self.map, *own, self._inverse_depth_sigma)
@@ -112,8 +115,10 @@ class KeyframeSlam:
         self.state, self.stamp_ns, self._seen_ns = state, frame.stamp_ns, frame.stamp_ns
         self._insert(frame, still=still)
 
-    def begin_moving(self, start: MovingStart) -> None:
-        """Start the map with two views; its unit is the first one's median depth."""
+    def begin_moving(self, start: MovingStart, turns: bool = False) -> None:
+        """Start the map with two views; its unit is the first one's median depth. With `turns`, the
+        gyro's turns count in the adjustment of the map: its bias is known."""
+        self.adjuster.turns = turns
         self.tracker.restart(start.first.image)
         ids = self.map.new_points(start.pixels_first, 0)
         self.map.place(ids, start.points_map)
@@ -130,7 +135,7 @@ class KeyframeSlam:
         """Follow the map into the next image.
         Returns the fit of the newest pose, None where the image gave none, and whether the map was
         adjusted as a whole."""
-        turn = self._turn
+        turn, self.moved_from = self._turn, None
         if self._image_turn is not None:
             turn = self._image_turn.rig_turn(frame.image, turn, self.T_rig_camera.rotation)
         prediction = self._predict(frame, turn)
@@ -154,7 +159,10 @@ class KeyframeSlam:
             return None, False
         timed = self.metric and self.calibration.imu is not None
         if self._choice.wanted(self.tracker, self.state, frame.stamp_ns, timed):
-            return fit, self._insert(frame)
+            before = self.T_map_camera()
+            adjusted = self._insert(frame)
+            self.moved_from = before if adjusted else None
+            return fit, adjusted
         return fit, False
 
     def note(self, stamp_ns: int) -> None:
@@ -181,6 +189,22 @@ class KeyframeSlam:
         self.map.move(scale, R_new_map, lever)
         self.state = self.state.scaled(scale, R_new_map, lever)
         self.metric = True
+
+    def move_about(self, T_map_camera: SE3, scale: float, R_new_map: F64) -> None:
+        """Scale and turn the map so that the newest camera comes to lie in a place.
+
+        Args:
+            T_map_camera: Pose whose centre is that place.
+            scale: Factor on all distances.
+            R_new_map: (3, 3) rotation after scaling.
+        """
+        self.path.scale(scale, self.T_rig_camera.translation)
+        metric = self.metric
+        self.make_upright(scale, R_new_map)
+        self.metric = metric
+        by = T_map_camera.translation - self.T_map_camera().translation
+        self.map.shift(by)
+        self.state = self.state.shifted(by)
 
     def make_inertial(self, alignment: InertialAlignment) -> None:
         """Make the map metric and upright; from now on the accelerometer counts."""

@@ -53,6 +53,8 @@ class MapAdjuster:
     Attributes:
         inverse_depth_sigma: Standard deviation of measured inverse depth [1/m].
         motions: Inertial motion before each keyframe, by its index, where known.
+        turns: Whether gyro turns between keyframes count where inertia does not; the biases of
+            the first keyframe's gyro must then be known.
         settled_ns: Keyframes up to this stamp took part in adjusting the whole map long after
             they were made, and hold what their inertial motions had to tell.
     """
@@ -63,6 +65,7 @@ class MapAdjuster:
     parameters: KeyframeSlam
     inverse_depth_sigma: float
     motions: dict[int, Preintegration] = field(default_factory=dict, init=False)
+    turns: bool = field(default=False, init=False)
     settled_ns: int = field(default=np.iinfo(np.int64).min, init=False)
     _next_all: int = field(default=FIRST_ALL, init=False)
 
@@ -155,10 +158,11 @@ class MapAdjuster:
         points = seen[self._views(chosen)[seen] >= 2]
         observations, rows = self._observations(chosen, points)
         place = {k: n for n, k in enumerate(chosen)}
+        known = (inertial or self.turns) and [k for k in chosen if k - 1 in place]
         factors = [
-            InertialFactor(place[k - 1], place[k], self.motions[k])
-            for k in chosen
-            if inertial and k in self.motions and k - 1 in place
+            InertialFactor(place[k - 1], place[k], motion if inertial else motion.turn_only())
+            for k in known or []
+            if (motion := self.motions.get(k)) is not None
         ]
         result = adjust(
             self._states(chosen),
@@ -170,7 +174,7 @@ class MapAdjuster:
             self.T_rig_camera,
             settings,
         )
-        self._apply(chosen, points, rows, result)
+        self._apply(chosen, points, rows, result, inertial)
         everywhere = self._views(range(len(self.map.keyframes)))
         self.map.drop(seen[everywhere[seen] < 2])
         return result.covariance
@@ -210,16 +214,24 @@ class MapAdjuster:
             inverse_depth_sigmas=np.full(len(inverse_depths), self.inverse_depth_sigma),
         ), rows
 
-    def _apply(self, chosen: list[int], points: I64, rows: list[I64], result: Adjustment) -> None:
+    def _apply(
+        self,
+        chosen: list[int],
+        points: I64,
+        rows: list[I64],
+        result: Adjustment,
+        inertial: bool,
+    ) -> None:
         """Take over the result and drop the observations that do not fit it."""
         states = result.states
         for n, k in enumerate(chosen):
+            before = self.map.keyframes[k].state
             self.map.keyframes[k].state = RigState(
                 states.rotations[n],
                 states.positions[n],
-                states.velocities[n],
+                states.velocities[n] if inertial else before.velocity,
                 states.gyro_biases[n],
-                states.accelerometer_biases[n],
+                states.accelerometer_biases[n] if inertial else before.accelerometer_bias,
             )
         self.map.positions[points] = result.points
         limit = MAX_RESIDUAL_SIGMAS * self.parameters.corner_sigma_px

@@ -13,7 +13,8 @@ from airground.slam.frame import Frame, require_order
 from airground.slam.front_end import ScaleEstimate, TrackedPose, Tracking
 from airground.slam.geometry.pose_estimation import PoseFit
 from airground.slam.keyframe_slam import KeyframeSlam
-from airground.slam.starts import RestStart, TwoViewWait
+from airground.slam.rig_state import RigState
+from airground.slam.starts import MovingStart, RestStart, TwoViewWait
 from airground.slam.tight_scale import TightScale
 
 MIN_TRACKED = 30
@@ -41,6 +42,7 @@ class MonocularSlam:
         self._scale = self._unknown_scale()
         self._rest = RestStart(calibration)
         self._two_views = TwoViewWait(calibration, config.monocular_slam, start_rng)
+        self._rested: RigState | None = None
         self._given_out = self._left = False
         self._last_ns: int | None = None
 
@@ -92,16 +94,23 @@ class MonocularSlam:
     def _begin(self, frame: Frame) -> None:
         """Begin the map if the robot just left its place, or two views allow it."""
         # Even flight reads as rest: after the first map the robot may be in the air.
-        may_rest = self._tight and not self._left
-        begin = self._rest.observe(frame, self._slam.motion) if may_rest else None
-        if begin is not None:
+        begin = None if self._left else self._rest.observe(frame, self._slam.motion)
+        if begin is not None and self._tight:
             self._slam.metric = self._slam.inertial = True
             self._slam.begin(*begin, still=True)
             self._slam.track(frame)
             return
+        if begin is not None:
+            self._rested = begin[1]
         moving = self._two_views.observe(frame, self._slam.motion)
         if moving is not None:
-            self._slam.begin_moving(moving)
+            self._begin_moving(moving)
+
+    def _begin_moving(self, start: MovingStart) -> None:
+        """Begin with two views; a robot that was at rest before knows its gyro's bias."""
+        if self._rested is not None:
+            start = start.biased(self._rested)
+        self._slam.begin_moving(start, turns=self._rested is not None)
 
     def _give_up(self) -> None:
         """Forget the map, and all that was known of its unit."""

@@ -68,6 +68,10 @@ class RigState:
         velocity = scale * rotation @ self.velocity
         return replace(self, rotation=turned, position=camera - turned @ lever, velocity=velocity)
 
+    def shifted(self, by: F64) -> RigState:
+        """The same state after the map was shifted by (3,) [m]."""
+        return replace(self, position=self.position + by)
+
     def moved(self, T_new_map: SE3) -> RigState:
         """The same state after the map moved."""
         return replace(

@@ -193,6 +193,12 @@ class SparseMap:
             moving = replace(standing, velocity=keyframe.state.velocity)
             keyframe.state = standing if keyframe.still else moving
 
+    def shift(self, by: F64) -> None:
+        """Move the whole map by (3,) [m]."""
+        for keyframe in self.keyframes:
+            keyframe.state = keyframe.state.shifted(by)
+        self.positions[: self._count] += by
+
     def move(self, scale: float, rotation: F64, lever: F64) -> None:
         """Scale and turn the whole map about its origin, as `RigState.scaled` does a state."""
         for keyframe in self.keyframes:

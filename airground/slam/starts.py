@@ -124,6 +124,18 @@ class MovingStart:
     pixels_second: F64
     points_map: F64
 
+    def biased(self, known: RigState) -> MovingStart:
+        """The same start with the biases of another state."""
+        biases = {
+            "gyro_bias": known.gyro_bias,
+            "accelerometer_bias": known.accelerometer_bias,
+        }
+        return replace(
+            self,
+            first_state=replace(self.first_state, **biases),
+            second_state=replace(self.second_state, **biases),
+        )
+
 
 class TwoViewWait:
     """Follows corners from one image until another sees enough of them from elsewhere."""

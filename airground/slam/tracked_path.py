@@ -47,6 +47,16 @@ class TrackedPath:
         relative = onto.state.pose().inverse() @ culled.state.pose()
         self._carried[culled.stamp_ns] = onto.stamp_ns, relative
 
+    def scale(self, scale: float, lever: F64) -> None:
+        """Follow a map whose distances grew by a factor, but not the (3,) place `lever` of the
+        camera in the rig."""
+        positions = self._poses[: self._count, :, 3]
+        positions[:] = scale * (positions - lever) + lever
+        for culled, (onto, T) in self._carried.items():
+            turned = lever - T.rotation @ lever
+            place = scale * (T.translation - turned) + turned
+            self._carried[culled] = onto, SE3(T.rotation, place)
+
     def trajectory(self, keyframes: Sequence[Keyframe]) -> Trajectory | None:
         """`T_map_camera` where the keyframes are now; None before the first image."""
         if not self._count:

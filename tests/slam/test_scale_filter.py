@@ -21,12 +21,12 @@ RATE_HZ = 30
 
 
 def filtered(images: Keyframes, guess: float = 1.0, lost: range = range(0)) -> ScaleFilter:
-    scale_filter = ScaleFilter(T_RIG_CAMERA, NOISE, guess)
+    scale_filter = ScaleFilter(T_RIG_CAMERA, guess)
     for k in range(len(images.rotations)):
         if k in lost:
             continue
         motion = images.motions[k - 1] if k > 0 and k - 1 not in lost else None
-        scale_filter.add(images.rotations[k], images.centres[k], motion)
+        scale_filter.add(images.rotations[k], images.centres[k], NOISE, motion)
     return scale_filter
 
 
@@ -84,8 +84,8 @@ def test_goes_on_after_images_were_lost():
 def test_knows_nothing_before_the_first_motion():
     rng = np.random.default_rng(5)
     images = images_of(lively(rng).position, rng, 1.0)
-    result = ScaleFilter(T_RIG_CAMERA, NOISE)
-    result.add(images.rotations[0], images.centres[0], None)
+    result = ScaleFilter(T_RIG_CAMERA)
+    result.add(images.rotations[0], images.centres[0], NOISE, None)
     assert np.isnan(result.scale)
     assert np.isinf(result.sigma)
     assert not result.observable

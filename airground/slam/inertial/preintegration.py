@@ -6,7 +6,7 @@ visual-inertial odometry", T-RO 2017.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,6 +28,9 @@ MAX_HELD_S = 0.02
 the clocks' difference after the newest of them [s]."""
 
 FIRST_CAPACITY = 4096
+OPEN_VARIANCE = 1e4
+"""Variance of a velocity [m^2/s^2] or position [m^2] that nothing is known of: a hundred times
+what a robot here reaches in a second."""
 
 Rotation = F64
 Vector = F64
@@ -99,6 +102,12 @@ class Preintegration:
             + self.position_by_accelerometer_bias @ force
         )
         return rotation, velocity, position
+
+    def turn_only(self) -> Preintegration:
+        """The motion as a gyro alone would know it: velocity and position are open."""
+        covariance = np.diag([0.0] * 3 + [OPEN_VARIANCE] * 6)
+        covariance[:3, :3] = self.covariance[:3, :3]
+        return replace(self, covariance=covariance)
 
     def predict(
         self, R: Rotation, p: Vector, v: Vector, gyro_bias: Vector, accelerometer_bias: Vector

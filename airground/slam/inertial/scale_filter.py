@@ -47,9 +47,8 @@ class ScaleFilter:
     """Scale and gravity of a visual map, image by image; noise is independent between images, and
     `guess` [metres in a visual unit] only weighs the priors."""
 
-    def __init__(self, T_rig_camera: SE3, noise: VisualNoise, guess: float = 1.0) -> None:
+    def __init__(self, T_rig_camera: SE3, guess: float = 1.0) -> None:
         self._lever = T_rig_camera.translation
-        self._noise = noise
         self._mean = np.zeros(SIZE)
         self._mean[UNIT] = 1.0 / guess
         sigmas = np.empty(SIZE)
@@ -92,17 +91,20 @@ class ScaleFilter:
         bias: F64 = self._mean[BIAS] * self.scale
         return bias
 
-    def add(self, rotation: F64, centre: F64, motion: Preintegration | None) -> None:
+    def add(
+        self, rotation: F64, centre: F64, noise: VisualNoise, motion: Preintegration | None
+    ) -> None:
         """Take in one image.
 
         Args:
             rotation: (3, 3) visual rotation `R_v_rig`.
             centre: (3,) centre of the camera in the visual map.
+            noise: Noise of the two; that of the centre grows with the depth of the scene.
             motion: Inertial motion since the previous image; None for the first image, and where
                 tracking or samples were lost in between.
         """
         if motion is not None and self._rotation is not None:
-            self._predict(self._rotation, motion)
+            self._predict(self._rotation, noise, motion)
             turned = self._rotation @ motion.rotation
             self._images += 1
             share = max(ROTATION_GAIN, 1.0 / self._images)
@@ -110,10 +112,28 @@ class ScaleFilter:
         else:
             self._forget_motion(centre)
             self._rotation, self._images = np.array(rotation), 1
-        self._update(self._rotation, centre)
+        self._update(self._rotation, centre, noise)
         if not self._anchored and self.sigma < SURE_SIGMA:
             self._anchor_bias()
         self._turn_gravity()
+
+    def follow(self, scale: float, rotation: F64, before: F64, after: F64) -> None:
+        """The map was scaled and turned: x became scale * rotation @ (x - before) + after."""
+        change = scale * np.eye(SIZE)
+        for part in (POSITION, VELOCITY):
+            change[part, part] = scale * rotation
+        shift = np.zeros(SIZE)
+        shift[POSITION] = after - scale * rotation @ before
+        if self._gravity is not None:
+            turned = rotation @ self._gravity
+            change[TILTS, TILTS] = (
+                scale * tangent_basis(turned).T @ rotation @ tangent_basis(self._gravity)
+            )
+            self._gravity = turned
+        if self._rotation is not None:
+            self._rotation = rotation @ self._rotation
+        self._mean = change @ self._mean + shift
+        self._covariance = change @ self._covariance @ change.T
 
     def _forget_motion(self, centre: F64) -> None:
         """The robot may be anywhere, at any speed."""
@@ -122,7 +142,7 @@ class ScaleFilter:
         self._covariance[range(6), range(6)] = (SPEED_SIGMA * unit) ** 2
         self._mean[POSITION], self._mean[VELOCITY] = centre, 0.0
 
-    def _predict(self, R: F64, motion: Preintegration) -> None:
+    def _predict(self, R: F64, visual: VisualNoise, motion: Preintegration) -> None:
         """Move on by one inertial motion that began at rotation R."""
         t = motion.duration_s
         by_bias = motion.velocity_by_accelerometer_bias, motion.position_by_accelerometer_bias
@@ -146,7 +166,7 @@ class ScaleFilter:
         turn[:3, :3] = turn[3:, 3:] = R
         swing = np.concatenate([so3.hat(moved), so3.hat(sped)])
         noise[:6, :6] = turn @ motion.covariance[np.ix_(order, order)] @ turn.T
-        noise[:6, :6] += self._noise.rotation_sigma**2 * swing @ swing.T
+        noise[:6, :6] += visual.rotation_sigma**2 * swing @ swing.T
         noise[UNIT, UNIT] = SCALE_WALK**2 * t
         noise[BIAS, BIAS] = motion.accelerometer_bias_sigma**2 * np.eye(3)
         self._mean = F @ self._mean
@@ -154,12 +174,12 @@ class ScaleFilter:
         square = self._mean[UNIT] ** 2 + self._covariance[UNIT, UNIT]
         self._covariance = F @ self._covariance @ F.T + square * noise
 
-    def _update(self, rotation: F64, centre: F64) -> None:
+    def _update(self, rotation: F64, centre: F64, noise: VisualNoise) -> None:
         """Take in where the camera is."""
         H = np.zeros((3, SIZE))
         H[:, POSITION] = np.eye(3)
         H[:, UNIT] = rotation @ self._lever
-        surprise = self._measure(H, centre, self._noise.position_sigma)
+        surprise = self._measure(H, centre, noise.position_sigma)
         self._surprise += (surprise - self._surprise) / MEMORY
 
     def _anchor_bias(self) -> None:
