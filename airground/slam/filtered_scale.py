@@ -19,6 +19,9 @@ FILTER_TILT = np.deg2rad(1.0)
 """Standard deviation of the filter's vertical, in simulation [rad]."""
 GIVE_OUT_SIGMA = 0.03
 """Poses are given out when the scale is known this well [share]."""
+UNIT_M = 0.1
+"""Guess of a map's unit, its first view's median depth: that of a floor from a landing gear [m].
+A map with a larger unit only has wider priors."""
 WORTH_MOVING = 0.01
 """The map follows the filter's scale when it differs by this share."""
 
@@ -41,7 +44,7 @@ class FilteredScale:
         self.known = slam.calibration.imu is None
         self.tilt_sigma = UNKNOWN_TILT
         self._slam = slam
-        self._filter = None if self.known else ScaleFilter(slam.T_rig_camera)
+        self._filter = None if self.known else ScaleFilter(slam.T_rig_camera, UNIT_M)
         self._first_ns: int | None = None
         self._last_ns = 0
         self._seen: tuple[I64, F64] | None = None
