@@ -68,17 +68,14 @@ class FilteredScale:
         if before is None or self._seen is None:
             return
         ids, old = self._seen
-        after = slam.T_map_camera()
         kept = slam.map.mapped(ids)
-        depths = [
-            (T.inverse() @ points[kept])[:, 2]
-            for T, points in ((before, old), (after, slam.map.positions[ids]))
-        ]
         if kept.sum() < slam.parameters.min_points:
             return
-        slam.move_about(
-            before, float(np.median(depths[0] / depths[1])), before.rotation @ after.rotation.T
-        )
+        after = slam.T_map_camera()
+        deep = (before.inverse() @ old[kept])[:, 2]
+        now_deep = (after.inverse() @ slam.map.positions[ids[kept]])[:, 2]
+        scale = float(np.median(deep / now_deep))
+        slam.move_about(before, scale, before.rotation @ after.rotation.T)
 
     def _learn(self, scale_filter: ScaleFilter, stamp_ns: int) -> None:
         """Feed the filter with the newest image and the motion that led to it."""
@@ -113,4 +110,3 @@ class FilteredScale:
         slam.move_about(here, scale, np.eye(3))
         scale_filter.follow(scale, np.eye(3), here.translation, here.translation)
         return True
-

@@ -185,9 +185,7 @@ class KeyframeSlam:
 
     def make_upright(self, scale: float, R_new_map: F64) -> None:
         """Scale the map to metres and turn it so that z points up."""
-        lever = self.T_rig_camera.translation
-        self.map.move(scale, R_new_map, lever)
-        self.state = self.state.scaled(scale, R_new_map, lever)
+        self._move(scale, R_new_map)
         self.metric = True
 
     def move_about(self, T_map_camera: SE3, scale: float, R_new_map: F64) -> None:
@@ -198,10 +196,7 @@ class KeyframeSlam:
             scale: Factor on all distances.
             R_new_map: (3, 3) rotation after scaling.
         """
-        self.path.scale(scale, self.T_rig_camera.translation)
-        metric = self.metric
-        self.make_upright(scale, R_new_map)
-        self.metric = metric
+        self._move(scale, R_new_map)
         by = T_map_camera.translation - self.T_map_camera().translation
         self.map.shift(by)
         self.state = self.state.shifted(by)
@@ -251,6 +246,13 @@ class KeyframeSlam:
         return self.map.depth_range(
             self.tracker.ids, self.T_map_camera(), self.parameters.min_points
         )
+
+    def _move(self, scale: float, R_new_map: F64) -> None:
+        """Scale and turn the map about its origin."""
+        lever = self.T_rig_camera.translation
+        self.path.scale(scale, lever)
+        self.map.move(scale, R_new_map, lever)
+        self.state = self.state.scaled(scale, R_new_map, lever)
 
     def _predict(self, frame: Frame, turn: F64) -> Prediction:
         assert self.stamp_ns is not None

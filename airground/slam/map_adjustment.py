@@ -53,8 +53,8 @@ class MapAdjuster:
     Attributes:
         inverse_depth_sigma: Standard deviation of measured inverse depth [1/m].
         motions: Inertial motion before each keyframe, by its index, where known.
-        turns: Whether gyro turns between keyframes count where inertia does not; the biases of
-            the first keyframe's gyro must then be known.
+        turns: Whether gyro turns between keyframes count where inertia does not; the gyro's bias
+            at the first keyframe must then be known.
         settled_ns: Keyframes up to this stamp took part in adjusting the whole map long after
             they were made, and hold what their inertial motions had to tell.
     """
@@ -158,11 +158,10 @@ class MapAdjuster:
         points = seen[self._views(chosen)[seen] >= 2]
         observations, rows = self._observations(chosen, points)
         place = {k: n for n, k in enumerate(chosen)}
-        known = (inertial or self.turns) and [k for k in chosen if k - 1 in place]
         factors = [
             InertialFactor(place[k - 1], place[k], motion if inertial else motion.turn_only())
-            for k in known or []
-            if (motion := self.motions.get(k)) is not None
+            for k, motion in sorted(self.motions.items())
+            if (inertial or self.turns) and k in place and k - 1 in place
         ]
         result = adjust(
             self._states(chosen),
