@@ -54,15 +54,16 @@ class FilteredScale:
         slam = self._slam
         if self._filter is None or not tracked or slam.stamp_ns is None:
             return False
-        self._stay()
+        self.stay()
         self._learn(self._filter, slam.stamp_ns)
         moved = self._follow(self._filter, slam.stamp_ns)
         ids = slam.tracker.ids[slam.map.mapped(slam.tracker.ids)]
         self._seen = ids, slam.map.positions[ids]
         return moved
 
-    def _stay(self) -> None:
-        """Where the whole map was adjusted: the view keeps its place and depth, the past moves."""
+    def stay(self) -> None:
+        """Where the whole map was adjusted, the view keeps its place and depth: the past moves.
+        Adjustment by vision alone leaves both open."""
         slam = self._slam
         before = slam.moved_from
         if before is None or self._seen is None:

@@ -57,8 +57,8 @@ class KeyframeSlam:
         inertial: Whether the map is metric and gravity-aligned and the velocity known, so
             that the accelerometer counts.
         metric: Whether the map's unit is the metre.
-        moved_from: Pose of the newest image before it made the whole map be adjusted; None where
-            it did not.
+        moved_from: Pose of the newest image before the whole map was adjusted; None where it was
+            not.
     """
 
     def __init__(
@@ -179,7 +179,7 @@ class KeyframeSlam:
 
     def adjust_all(self) -> None:
         """Adjust the whole map and go on from its newest keyframe."""
-        before = self.map.keyframes[-1].state.pose()
+        before, self.moved_from = self.map.keyframes[-1].state.pose(), self.T_map_camera()
         self.adjuster.adjust_all(self.inertial)
         self.state = self.state.following(before, self.map.keyframes[-1].state)
 

@@ -86,6 +86,8 @@ class MonocularSlam:
         """Adjust the whole map."""
         if self._slam.begun:
             self._slam.adjust_all()
+            if isinstance(self._scale, FilteredScale):
+                self._scale.stay()
 
     def trajectory(self) -> Trajectory | None:
         """The newest poses of all images tracked so far."""
