@@ -13,8 +13,8 @@ from airground.slam.keyframe_slam import KeyframeSlam
 from airground.slam.tight_scale import UNKNOWN_TILT, pose_sigma
 
 SETTLING_S = 4.0
-"""Motion that the filter must see before its result is used [s]: a take-off, which takes 3 s,
-and the first way along the ground."""
+"""Motion that the filter must see before its result is used [s]: a whole take-off, which takes
+3 s. While the robot rises, the visual errors depend on each other more than the filter knows."""
 FILTER_TILT = np.deg2rad(1.0)
 """Standard deviation of the filter's vertical, in simulation [rad]."""
 GIVE_OUT_SIGMA = 0.03
@@ -27,7 +27,7 @@ WORTH_MOVING = 0.01
 
 
 class FilteredScale:
-    """Loosely coupled: vision alone makes the map, the filter gives its unit and vertical.
+    """Loosely coupled: vision and the gyro's turns make the map, the filter its unit and vertical.
 
     The map is scaled and turned when the scale is known, and scaled again as the filter learns
     more. The newest camera keeps its place then, and in adjustments of the whole map, so that

@@ -29,8 +29,8 @@ class MonocularSlam:
     """A front end of the MAV, with the section `monocular_slam` of the configuration.
 
     From rest the map is metric at once: the accelerometer carries the robot through its
-    take-off until enough points are triangulated. In motion it begins with two views and
-    an unknown scale, and poses are given out when the scale is known.
+    take-off until enough points are triangulated. In motion, and always with the scale filter,
+    it begins with two views and an unknown scale, and poses are given out when that is known.
     """
 
     def __init__(

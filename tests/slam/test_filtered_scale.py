@@ -64,6 +64,46 @@ def test_the_newest_pose_moves_with_the_map() -> None:
     assert moved == pytest.approx(np.linalg.norm(true[1] - true[0]), rel=0.2, abs=0.005)
 
 
+def test_the_view_stays_when_the_whole_map_is_adjusted() -> None:
+    """Vision alone leaves place and unit open: what is being built on the view must not be torn."""
+    driven = DrivenSlam(lively(np.random.default_rng(1)), SECONDS, 1)
+    scale, index = settle(driven)
+    assert index is not None
+    slam = driven.slam
+    ids = np.arange(100)
+    slam.tracker.add(ids, np.zeros((100, 2)))
+    driven.image(index + 1)
+    scale.update(True)
+    before = slam.T_map_camera()
+    points, error = slam.map.positions[ids].copy(), driven.scale_error()
+    other = SE3.from_rotation_vector((0.1, 0.05, -0.2), (0.3, 0.2, -0.1))
+    slam.move_about(other, 1.3, other.rotation)
+    slam.moved_from = before
+    scale.stay()
+    np.testing.assert_allclose(slam.T_map_camera().matrix(), before.matrix(), atol=1e-9)
+    np.testing.assert_allclose(slam.map.positions[ids], points, atol=1e-9)
+    assert driven.scale_error() == pytest.approx(error, abs=1e-9)
+
+
+def test_the_map_follows_the_scale_as_the_filter_learns() -> None:
+    """A map that vision stretched by 5 % meanwhile is brought back; the newest camera stays."""
+    driven = DrivenSlam(lively(np.random.default_rng(1)), SECONDS, 1)
+    scale, index = settle(driven)
+    assert index is not None
+    slam = driven.slam
+    scale_filter = scale._filter
+    assert scale_filter is not None
+    here = slam.T_map_camera()
+    scale_filter.follow(1 / 1.05, np.eye(3), here.translation, here.translation)
+    before = driven.scale_error()
+    assert slam.stamp_ns is not None
+    assert scale._follow(scale_filter, slam.stamp_ns)
+    assert scale_filter.scale == pytest.approx(1.0, abs=1e-9)
+    ratio = (1 + driven.scale_error()) / (1 + before)
+    assert ratio == pytest.approx(1.05, abs=0.01)
+    np.testing.assert_allclose(slam.T_map_camera().translation, here.translation, atol=1e-9)
+
+
 def test_velocities_move_with_the_map() -> None:
     driven = DrivenSlam(lively(np.random.default_rng(0)), 1.0)
     driven.image(0)

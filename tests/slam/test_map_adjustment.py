@@ -122,6 +122,33 @@ def test_with_an_imu_the_beginning_may_tilt_while_the_window_reaches_it(chosen: 
     assert chosen[1][1] == [Role.GAUGE, Role.FREE, Role.FREE, Role.FREE]
 
 
+def turned(sparse_map: SparseMap, problem: Problem) -> float:
+    """Largest error of the rotation between neighbours [rad]."""
+    rotations = [keyframe.state.rotation for keyframe in sparse_map.keyframes]
+    true = problem.states.rotations
+    return max(
+        float(np.linalg.norm(so3.log((a.T @ b).T @ (c.T @ d))))
+        for a, b, c, d in zip(rotations, rotations[1:], true, true[1:], strict=False)
+    )
+
+
+def test_gyro_turns_hold_the_attitude_of_a_map_by_vision() -> None:
+    """Velocities and the accelerometer's biases are as before: the motions only turn."""
+    problem = bundle_problems.make(10, 40, 15)
+    by_vision, by_both = map_of(problem), map_of(problem)
+    for sparse_map, turns in ((by_vision, False), (by_both, True)):
+        shaken(sparse_map, range(1, 10))
+        adjuster = adjuster_of(sparse_map, problem)
+        adjuster.turns = turns
+        adjuster.adjust_all(False)
+    assert turned(by_both, problem) < 0.5 * turned(by_vision, problem)
+    for k, keyframe in enumerate(by_both.keyframes):
+        np.testing.assert_array_equal(keyframe.state.velocity, problem.states.velocities[k])
+        np.testing.assert_array_equal(
+            keyframe.state.accelerometer_bias, problem.states.accelerometer_biases[k]
+        )
+
+
 def test_one_keyframe_alone_is_left_as_it_is() -> None:
     problem = bundle_problems.make(1, 100, 50, inertial=False)
     sparse_map = map_of(problem)

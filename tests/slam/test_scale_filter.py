@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from airground.slam import so3
+from airground.slam.inertial.alignment import VisualNoise
 from airground.slam.inertial.scale_filter import ScaleFilter
 from tests.slam.inertial_keyframes import (
     NOISE,
@@ -79,6 +81,48 @@ def test_goes_on_after_images_were_lost():
     images = images_of(lively(rng).position, rng, 8.0)
     result = filtered(images, lost=range(100, 130))
     assert result.scale == pytest.approx(UNIT_M, rel=0.02)
+
+
+def test_follows_a_map_that_is_scaled_turned_and_shifted():
+    rng = np.random.default_rng(5)
+    images = images_of(lively(rng).position, rng, 6.0)
+    stays, follows = ScaleFilter(T_RIG_CAMERA), ScaleFilter(T_RIG_CAMERA)
+    factor, shift = 3.0, np.array([1.0, -2.0, 0.5])
+    turn = so3.exp(np.array([0.4, -1.0, 0.2]))
+    moved = False
+    for k in range(len(images.rotations)):
+        motion = images.motions[k - 1] if k > 0 else None
+        R, centre = images.rotations[k], images.centres[k]
+        if k == 90:
+            follows.follow(factor, turn, np.zeros(3), shift)
+            moved = True
+        stays.add(R, centre, NOISE, motion)
+        if moved:
+            noise = VisualNoise(factor * NOISE.position_sigma, NOISE.rotation_sigma)
+            follows.add(turn @ R, factor * turn @ centre + shift, noise, motion)
+        else:
+            follows.add(R, centre, NOISE, motion)
+    assert follows.scale == pytest.approx(stays.scale / factor, rel=1e-6)
+    assert follows.sigma == pytest.approx(stays.sigma, rel=1e-6)
+    np.testing.assert_allclose(follows.gravity, turn @ stays.gravity, rtol=1e-6)
+    np.testing.assert_allclose(
+        follows.accelerometer_bias, stays.accelerometer_bias, rtol=1e-4, atol=1e-6
+    )
+
+
+def test_a_rising_camera_is_measured_ever_more_coarsely():
+    """The noise is each image's own: over a rise, that of the first one would be far too small."""
+    rng = np.random.default_rng(3)
+    images = images_of(rising, rng, 6.0)
+    honest, misled = ScaleFilter(T_RIG_CAMERA), ScaleFilter(T_RIG_CAMERA)
+    for k, (R, centre) in enumerate(zip(images.rotations, images.centres, strict=True)):
+        coarse = VisualNoise(NOISE.position_sigma * (1.0 + 0.1 * k), NOISE.rotation_sigma)
+        seen = centre + rng.normal(0.0, coarse.position_sigma, 3)
+        motion = images.motions[k - 1] if k > 0 else None
+        honest.add(R, seen, coarse, motion)
+        misled.add(R, seen, NOISE, motion)
+    assert abs(np.log(honest.scale / UNIT_M)) < 3.0 * honest.sigma
+    assert abs(honest.scale - UNIT_M) < abs(misled.scale - UNIT_M)
 
 
 def test_knows_nothing_before_the_first_motion():

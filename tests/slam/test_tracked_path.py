@@ -79,3 +79,19 @@ def test_many_images_and_a_new_beginning() -> None:
     np.testing.assert_allclose(trajectory[-1].matrix(), pose.matrix(), atol=1e-12)
     path.clear()
     assert path.trajectory(keyframes) is None
+
+
+def test_images_follow_a_map_that_grows() -> None:
+    """Distances between cameras grow, the camera's place in the rig does not."""
+    rng = np.random.default_rng(2)
+    path, keyframes = path_over(4, rng)
+    path.rehang(keyframes[1], keyframes[2])
+    del keyframes[1]
+    before = poses(path, keyframes)
+    lever = np.array([0.1, -0.2, 0.3])
+    path.scale(2.5, lever)
+    for keyframe in keyframes:
+        keyframe.state = keyframe.state.scaled(2.5, np.eye(3), lever)
+    after = poses(path, keyframes)
+    np.testing.assert_allclose(after[:, :3, 3], 2.5 * before[:, :3, 3], atol=1e-12)
+    np.testing.assert_allclose(after[:, :3, :3], before[:, :3, :3], atol=1e-12)

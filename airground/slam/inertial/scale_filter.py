@@ -5,7 +5,10 @@ modular vision-inertial systems", ICRA 2011. As there, vision gives poses and th
 the prediction. Here the state is in visual units, where vision is right: were positions
 metric and measured as (1 / scale) times that, the product of two unknowns would draw the
 scale away (up to -37 %). The state holds the inverse of the scale, and bias and tilt times
-it: in these the motion is linear, so that no first guess of the scale is needed.
+it: in these the motion is linear, so that no first guess of the scale is needed. The unknowns are
+those of the closed form (Kneip, Martinelli and Siegwart, "Closed-form solution for absolute scale
+velocity determination combining inertial measurements and a single feature correspondence", ICRA
+2011), solved image by image.
 """
 
 from __future__ import annotations
@@ -44,8 +47,13 @@ MEMORY = 100
 
 
 class ScaleFilter:
-    """Scale and gravity of a visual map, image by image; noise is independent between images, and
-    `guess` [metres in a visual unit] only weighs the priors."""
+    """Scale and gravity of a visual map, image by image; noise is independent between images.
+
+    Args:
+        T_rig_camera: Place of the camera in the rig.
+        guess: Metres in a visual unit, for the priors alone. One that is too large makes them too
+            narrow, and the scale seems to be known before it is.
+    """
 
     def __init__(self, T_rig_camera: SE3, guess: float = 1.0) -> None:
         self._lever = T_rig_camera.translation
