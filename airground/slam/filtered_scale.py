@@ -76,7 +76,7 @@ class FilteredScale:
         deep = (before.inverse() @ old[kept])[:, 2]
         now_deep = (after.inverse() @ slam.map.positions[ids[kept]])[:, 2]
         scale = float(np.median(deep / now_deep))
-        slam.move_about(before, scale, before.rotation @ after.rotation.T)
+        slam.move(scale, before.rotation @ after.rotation.T, before.translation)
 
     def _learn(self, scale_filter: ScaleFilter, stamp_ns: int) -> None:
         """Feed the filter with the newest image and the motion that led to it."""
@@ -98,7 +98,7 @@ class FilteredScale:
         settled = (stamp_ns - self._first_ns) * 1e-9 >= SETTLING_S
         if not settled or scale_filter.sigma > GIVE_OUT_SIGMA or gravity is None:
             return False
-        scale, here = scale_filter.scale, slam.T_map_camera()
+        scale, here = scale_filter.scale, slam.T_map_camera().translation
         if not self.known:
             right = slam.map.keyframes[0].state.rotation @ slam.T_rig_camera.rotation[:, 0]
             turn = gravity_aligned(-gravity, right)
@@ -108,6 +108,6 @@ class FilteredScale:
             return True
         if abs(np.log(scale)) < WORTH_MOVING:
             return False
-        slam.move_about(here, scale, np.eye(3))
-        scale_filter.follow(scale, np.eye(3), here.translation, here.translation)
+        slam.move(scale, np.eye(3), here)
+        scale_filter.follow(scale, np.eye(3), here, here)
         return True

@@ -115,10 +115,8 @@ class KeyframeSlam:
         self.state, self.stamp_ns, self._seen_ns = state, frame.stamp_ns, frame.stamp_ns
         self._insert(frame, still=still)
 
-    def begin_moving(self, start: MovingStart, turns: bool = False) -> None:
-        """Start the map with two views; its unit is the first one's median depth. With `turns`, the
-        gyro's turns count in the adjustment of the map: its bias is known."""
-        self.adjuster.turns = turns
+    def begin_moving(self, start: MovingStart) -> None:
+        """Start the map with two views; its unit is the first one's median depth."""
         self.tracker.restart(start.first.image)
         ids = self.map.new_points(start.pixels_first, 0)
         self.map.place(ids, start.points_map)
@@ -185,21 +183,20 @@ class KeyframeSlam:
 
     def make_upright(self, scale: float, R_new_map: F64) -> None:
         """Scale the map to metres and turn it so that z points up."""
-        self._move(scale, R_new_map)
+        self.move(scale, R_new_map)
         self.metric = True
 
-    def move_about(self, T_map_camera: SE3, scale: float, R_new_map: F64) -> None:
-        """Scale and turn the map so that the newest camera comes to lie in a place.
-
-        Args:
-            T_map_camera: Pose whose centre is that place.
-            scale: Factor on all distances.
-            R_new_map: (3, 3) rotation after scaling.
-        """
-        self._move(scale, R_new_map)
-        by = T_map_camera.translation - self.T_map_camera().translation
-        self.map.shift(by)
-        self.state = self.state.shifted(by)
+    def move(self, scale: float, R_new_map: F64, place: F64 | None = None) -> None:
+        """Scale and turn the map, about its origin or so that its newest camera is in a (3,) place
+        afterwards."""
+        lever = self.T_rig_camera.translation
+        self.path.scale(scale, lever)
+        self.map.move(scale, R_new_map, lever)
+        self.state = self.state.scaled(scale, R_new_map, lever)
+        if place is not None:
+            by = place - self.T_map_camera().translation
+            self.map.shift(by)
+            self.state = self.state.shifted(by)
 
     def make_inertial(self, alignment: InertialAlignment) -> None:
         """Make the map metric and upright; from now on the accelerometer counts."""
@@ -246,13 +243,6 @@ class KeyframeSlam:
         return self.map.depth_range(
             self.tracker.ids, self.T_map_camera(), self.parameters.min_points
         )
-
-    def _move(self, scale: float, R_new_map: F64) -> None:
-        """Scale and turn the map about its origin."""
-        lever = self.T_rig_camera.translation
-        self.path.scale(scale, lever)
-        self.map.move(scale, R_new_map, lever)
-        self.state = self.state.scaled(scale, R_new_map, lever)
 
     def _predict(self, frame: Frame, turn: F64) -> Prediction:
         assert self.stamp_ns is not None

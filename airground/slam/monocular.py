@@ -112,7 +112,8 @@ class MonocularSlam:
         """Begin with two views; a robot that was at rest before knows its gyro's bias."""
         if self._rested is not None:
             start = start.biased(self._rested)
-        self._slam.begin_moving(start, turns=self._rested is not None)
+        self._slam.adjuster.turns = self._rested is not None
+        self._slam.begin_moving(start)
 
     def _give_up(self) -> None:
         """Forget the map, and all that was known of its unit."""

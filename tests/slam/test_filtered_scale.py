@@ -77,7 +77,7 @@ def test_the_view_stays_when_the_whole_map_is_adjusted() -> None:
     before = slam.T_map_camera()
     points, error = slam.map.positions[ids].copy(), driven.scale_error()
     other = SE3.from_rotation_vector((0.1, 0.05, -0.2), (0.3, 0.2, -0.1))
-    slam.move_about(other, 1.3, other.rotation)
+    slam.move(1.3, other.rotation, other.translation)
     slam.moved_from = before
     scale.stay()
     np.testing.assert_allclose(slam.T_map_camera().matrix(), before.matrix(), atol=1e-9)
