@@ -20,6 +20,7 @@ from airground.core.events import (
     Initializing,
     MapAugmented,
     MavTracked,
+    NotLocated,
     PosesCorrected,
     Sighted,
     SurfaceCast,
@@ -37,6 +38,9 @@ from airground.localization.particle_filter import MonteCarloLocalizer
 from airground.refinement import refine
 from airground.slam.front_end import TrackedPose, Tracking
 from airground.tracking import TrackedFrame
+
+NO_POSE = "no pose: a robot was lost, or had no map yet"
+NO_HEADING = "no heading: the magnetometers do not agree on one, and it is not searched"
 
 
 class Mapping:
@@ -153,14 +157,19 @@ class Pipeline:
         yield event
         if isinstance(event, SurfaceCast):
             sighting = self.mapping.sight(event.surface)
-            if sighting is not None:
-                yield Sighted(event.stamp_ns, sighting)
-                yield from self.locate_and_augment(sighting)
+            if sighting is None:
+                yield NotLocated(event.stamp_ns, NO_POSE)
+                return
+            yield Sighted(event.stamp_ns, sighting)
+            yield from self.locate_and_augment(sighting)
 
     def locate_and_augment(self, sighting: Sighting) -> Iterator[Event]:
         """Localization, refinement and augmentation of one aerial surface."""
         # Global localization (Sec. VI), unless a prior pose was given.
         if not self._has_prior:
+            if self._config.localization.heading != "search" and sighting.heading is None:
+                yield NotLocated(sighting.surface.stamp_ns, NO_HEADING)
+                return
             yield from locate(self._localizer, sighting)
             belief = self._localizer.belief
             self._T_ground_mav = belief.T_ground_mav if belief and belief.converged else None

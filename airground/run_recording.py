@@ -97,7 +97,7 @@ def run(
         T_ground_mav_prior: Prior pose that replaces the global search (Sec. III).
 
     Raises:
-        InputError: While iterating: an image cannot be read, or the heading is unknown.
+        InputError: While iterating: an image cannot be read.
     """
     return Run(recording, config, seed, T_ground_mav_prior)
 

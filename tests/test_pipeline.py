@@ -16,6 +16,7 @@ from airground.core.events import (
     Event,
     GroundMapExtended,
     MapAugmented,
+    NotLocated,
     SurfaceCast,
     TrackingLost,
 )
@@ -29,7 +30,7 @@ from airground.core.messages import (
 )
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
-from airground.pipeline import Pipeline
+from airground.pipeline import NO_HEADING, NO_POSE, Pipeline
 from airground.slam.front_end import TrackedPose, Tracking
 from airground.tracking import FrontEnds, TrackedFrame, Trackers
 from tests.dense.synthetic import CAMERA, flight, heap_world, noisy
@@ -184,6 +185,21 @@ def test_same_seed_same_bytes(recorded: Recorded, found: tuple[Pipeline, list[Ev
     for one, two in zip(of(found[1], Aligned), of(again, Aligned), strict=True):
         one_bytes = one.alignment.T_ground_mav.matrix().tobytes()
         assert one_bytes == two.alignment.T_ground_mav.matrix().tobytes()
+
+
+@pytest.mark.slow
+def test_a_surface_without_a_heading_or_a_pose_says_why(recorded: Recorded) -> None:
+    """Without magnetometers the heading is unknown; a ground robot without a map has no pose."""
+    images = [one for one in recorded.messages if not isinstance(one.message, MagneticSamples)]
+    known = FrontEnds(Known(recorded.mav), Known(recorded.ground))
+    lost = FrontEnds(Known(recorded.mav), Known(dict.fromkeys(recorded.ground)))
+    for front_ends, reason in ((known, NO_HEADING), (lost, NO_POSE)):
+        trackers = Trackers(CALIBRATION["mav"], CALIBRATION["ground"], front_ends)
+        events = list(empty_pipeline().run(trackers.frames(images)))
+        reasons = {event.reason for event in of(events, NotLocated)}
+        assert reasons == {reason}
+        assert len(of(events, NotLocated)) == len(of(events, SurfaceCast)) >= 2
+        assert not of(events, BeliefUpdated)
 
 
 @pytest.mark.slow

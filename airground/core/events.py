@@ -115,6 +115,13 @@ class Sighted(Event):
 
 
 @dataclass(frozen=True)
+class NotLocated(Event):
+    """An aerial surface cannot be located; `reason` says why, after the kind and a colon."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
 class HeightMapsMade(Event):
     """Both maps were projected to the ground plane (Sec. VI-A, Fig. 7a and b)."""
 

@@ -133,6 +133,7 @@ def motion_at(estimate: F64, position_mav: F64, height_offset: float) -> SE3:
 
 def why_refused(overlay: Overlays, agreed: Agreement, particles: F64, config: Localization) -> str:
     """The reason, in one line, why no position is claimed; empty if one is.
+    Its kind comes first: no overlap, no structure, particles split or heights disagree.
 
     The covariance says whether particles agree with each other, not whether they are right: the
     rest asks whether the maps fit at the estimate, better than beside it.
@@ -144,7 +145,7 @@ def why_refused(overlay: Overlays, agreed: Agreement, particles: F64, config: Lo
     """
     overlap = float(overlay.overlaps()[0])
     if not overlap > config.min_overlap:
-        return f"only {overlap:.0%} of the aerial map lies on the ground map at the estimate"
+        return f"no overlap: only {overlap:.0%} of the aerial map lies on the ground map"
     relief = float(overlay.reliefs()[0])
     if relief < config.min_relief_m:
         return f"no structure: heights deviate by {1000 * relief:.0f} mm where the maps overlap"
@@ -153,11 +154,11 @@ def why_refused(overlay: Overlays, agreed: Agreement, particles: F64, config: Lo
         return refusal
     correlation = float(overlay.correlations()[0])
     if correlation < config.min_correlation:
-        return f"heights at the estimate correlate by {correlation:.2f} only"
+        return f"heights disagree: at the estimate they correlate by {correlation:.2f} only"
     if agreed.kappa < config.min_agreement:
         return (
-            f"heights agree over {agreed.share:.0%} at the estimate, "
-            f"and over {agreed.chance:.0%} beside it: that may be chance"
+            f"heights disagree: they agree over {agreed.share:.0%} at the estimate, "
+            f"and over {agreed.chance:.0%} beside it, which may be chance"
         )
     return ""
 
@@ -168,9 +169,9 @@ def _why_spread(particles: F64, config: Localization) -> str:
     if config.estimate == "mode":
         mode = densest_mode(particles)
         if mode.mean() < config.min_mode_share:
-            return f"only {mode.mean():.0%} of the particles agree on a place"
+            return f"particles split: only {mode.mean():.0%} of them agree on a place"
         counted = particles[mode]
     spread_m = float(np.sqrt(np.trace(np.cov(counted[:, :2].T))))
     if spread_m > config.converged_spread_m:
-        return f"the particles are still spread over {spread_m:.2f} m"
+        return f"particles split: they are still spread over {spread_m:.2f} m"
     return ""

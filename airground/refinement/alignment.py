@@ -27,7 +27,7 @@ def refine(
     settings = config.refinement
     for name, cloud in (("aerial", aerial), ("ground", ground)):
         if len(cloud) < MIN_POINTS:
-            refusal = f"the {name} cloud has {len(cloud)} points, at least {MIN_POINTS} are needed"
+            refusal = f"no structure: the {name} cloud has {len(cloud)} points of {MIN_POINTS}"
             return _refused(stamp_ns, T_ground_mav_start, refusal)
     nearby = _nearby(ground.points, T_ground_mav_start @ aerial.points, settings)
     if len(nearby) < MIN_POINTS:
@@ -42,7 +42,7 @@ def refine(
     if settings.local_search:
         found = search_nearby(source.points, nearby, start, settings)
         if found is None:
-            return _refused(stamp_ns, start, "no overlap of the height maps around the start")
+            return _refused(stamp_ns, start, "no overlap: height maps share too little nearby")
         start = found
 
     target = make_surfels(nearby, settings.voxel_m)
@@ -90,15 +90,15 @@ def _judged(
         refusal = "no overlap: the ground map has nothing below the aerial surface"
     elif share < settings.min_inliers:
         refusal = (
-            f"only {share:.0%} of the aerial points over the ground map lie on it, "
-            f"{settings.min_inliers:.0%} are needed"
+            f"clouds disagree: {share:.0%} of the aerial points over the ground map lie on it, of "
+            f"{settings.min_inliers:.0%} needed"
         )
     else:
         agreed = agreement(make_height_map(moved, COVER_CELLS_PER_M), cover)
         if agreed.kappa < settings.min_agreement:
             refusal = (
-                f"heights agree over {agreed.share:.0%}, and over {agreed.chance:.0%} when "
-                "shifted: too little structure, or the wrong place"
+                f"heights disagree: they agree over {agreed.share:.0%}, and over "
+                f"{agreed.chance:.0%} when shifted, by too little structure or in the wrong place"
             )
     return Alignment(stamp_ns, motion, share, rmse_m, not refusal, refusal)
 

@@ -74,6 +74,8 @@ class TrackedPose:
             `FrontEnd.trajectory` returns.
         corners: Corners followed into the image, for display; None where the front end has
             none, or runs in another process.
+        waiting: What a front end without a map waits for and how far it got, in words; empty
+            otherwise, and where the front end runs in another process.
     """
 
     stamp_ns: int
@@ -84,6 +86,7 @@ class TrackedPose:
     depth_range: tuple[float, float] | None = None
     corrected: bool = False
     corners: TrackedCorners | None = None
+    waiting: str = ""
 
     def __post_init__(self) -> None:
         if (self.tracking is Tracking.TRACKED) != (self.T_map_camera is not None):

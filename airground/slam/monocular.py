@@ -132,4 +132,29 @@ class MonocularSlam:
 
     def _initializing(self, frame: Frame) -> TrackedPose:
         scale = self._scale.estimate or UNKNOWN_SCALE
-        return TrackedPose(frame.stamp_ns, Tracking.INITIALIZING, None, scale=scale)
+        return TrackedPose(
+            frame.stamp_ns, Tracking.INITIALIZING, None, scale=scale, waiting=self._waiting()
+        )
+
+    def _waiting(self) -> str:
+        """What is waited for and how far it got, in words."""
+        slam = self._slam
+        if not slam.begun:
+            resting = self._rest.resting and not self._left
+            waiting = "motion: the IMU reads rest" if resting else self._two_views.waiting()
+        elif self._scale.known:
+            seen = int(slam.map.mapped(slam.tracker.ids).sum())
+            waiting = f"{MIN_TRACKED} map points in the image: {seen} in the newest"
+        else:
+            stamps_ns = [keyframe.stamp_ns for keyframe in slam.map.keyframes]
+            seconds = (stamps_ns[-1] - stamps_ns[0]) * 1e-9
+            keyframes = f"{len(stamps_ns)} keyframes in {seconds:.1f} s"
+            waiting = f"the scale: {keyframes} do not show it yet"
+            estimate = self._scale.estimate
+            if estimate is not None and np.isfinite(estimate.sigma):
+                tilt_deg = np.rad2deg(self._scale.tilt_sigma)
+                waiting = (
+                    f"the scale: after {keyframes} it is known to {estimate.sigma:.0%} and the "
+                    f"vertical to {tilt_deg:.1f} deg"
+                )
+        return f"{waiting} (a map was given up before)" if self._left else waiting

@@ -43,6 +43,7 @@ class RgbdSlam:
         )
         self._slam.metric = True
         self._standing = StandStill(calibration)
+        self._most_points = 0
         self._last_ns: int | None = None
 
     def add_imu(self, samples: ImuSamples) -> None:
@@ -90,8 +91,14 @@ class RgbdSlam:
         slam = self._slam
         state = level_start(slam.motion, slam.calibration, frame.stamp_ns)
         slam.begin(frame, state, still=False)
-        if slam.map.mapped(slam.tracker.ids).sum() < MIN_FIRST_POINTS:
+        points = int(slam.map.mapped(slam.tracker.ids).sum())
+        if points < MIN_FIRST_POINTS:
             slam.reset()
-            return TrackedPose(frame.stamp_ns, Tracking.INITIALIZING, None)
+            self._most_points = max(self._most_points, points)
+            waiting = (
+                f"an image with {MIN_FIRST_POINTS} corners that have depth: at most "
+                f"{self._most_points} so far"
+            )
+            return TrackedPose(frame.stamp_ns, Tracking.INITIALIZING, None, waiting=waiting)
         slam.note(frame.stamp_ns)
         return TrackedPose(frame.stamp_ns, Tracking.TRACKED, slam.T_map_camera())

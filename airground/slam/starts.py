@@ -85,6 +85,11 @@ class RestStart:
         self._calibration = calibration
         self._resting: deque[tuple[Frame, RigState]] = deque(maxlen=REST_FRAMES)
 
+    @property
+    def resting(self) -> bool:
+        """Whether the robot rested at the newest image."""
+        return bool(self._resting)
+
     def observe(self, frame: Frame, motion: MotionModel) -> tuple[Frame, RigState] | None:
         """Take in the next image; once the robot moved, an image and the state at rest."""
         noise = self._calibration.imu
@@ -177,6 +182,18 @@ class TwoViewWait:
         if not start.good or start.T_a_b is None:
             return None
         return self._made(self._first, frame, start, before, here, motion)
+
+    def waiting(self) -> str:
+        """What is waited for and how far it got, in words."""
+        seen, needed = len(self._corners), round(MIN_LEFT * MIN_CORNERS)
+        if seen < needed:
+            return f"a first view with corners: {seen} in the newest, {needed} are needed"
+        ids = self._tracker.ids
+        moved_px = np.linalg.norm(self._tracker.pixels - self._corners[ids], axis=1)
+        return (
+            f"a second view from elsewhere: {len(ids)} of {seen} corners are still followed, "
+            f"median motion {np.median(moved_px) if len(ids) else 0.0:.1f} px"
+        )
 
     def _restart(self, frame: Frame) -> None:
         self._tracker.clear()

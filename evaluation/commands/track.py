@@ -65,6 +65,9 @@ class Track(FolderOptions, ConfigOptions, SeedOption, OutOption, Verb):
                 folder = out if len(names) == 1 else out / name
                 folder.mkdir(exist_ok=True)
                 summaries.append(write_alone(folder, recording, name, results[name], true_pose))
+            untracked = [one["why_untracked"] for one in summaries if one["why_untracked"]]
+            if len(untracked) == len(names):
+                raise InputError(untracked[0])
             if len(names) > 1:
                 draw_front_ends(out, recording, results, true_pose)
         for summary in summaries:

@@ -8,16 +8,14 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from airground.augmentation import AugmentedMap
-from airground.core.belief import Alignment
 from airground.core.cloud import Source
-from airground.core.events import Aligned, BeliefUpdated, SurfaceCast
 from airground.core.messages import GroundImage, ImuSamples, MavImage
 from airground.core.trajectory import Trajectory
 from airground.errors import InputError
@@ -26,7 +24,8 @@ from airground.io.robot_recording import Pair, RobotRecording
 from airground.io.tum import write_tum
 from airground.slam.front_end import FrontEnd
 from evaluation.run.driver import drive, pipeline_for
-from evaluation.run.onlooker import Onlooker, Seen
+from evaluation.run.onlooker import Onlooker
+from evaluation.run.pair_events import PairEvents
 from evaluation.run.tracking import (
     TrackingHere,
     TrackingTask,
@@ -76,6 +75,18 @@ def run_alone(recording: RobotRecording, front_end: FrontEnd[Any]) -> AloneResul
     return AloneResult(watched.log(), watched.trajectory(), finish_ms)
 
 
+def why_untracked(recording: RobotRecording, log: FrontEndLog) -> str:
+    """One line on why no image of a recording was tracked; empty where one was."""
+    if not log.answers or log.live_poses():
+        return ""
+    waiting = log.waiting or "a first pose"
+    return (
+        f"{recording.path}: none of the {len(log.answers)} images ({recording.duration_s:.1f} s) "
+        f"of the {recording.robot.name.lower()} was tracked; the front end still waited for "
+        f"{waiting}"
+    )
+
+
 def write_alone(
     folder: Path,
     recording: RobotRecording,
@@ -97,6 +108,7 @@ def write_alone(
             "p95": float(np.percentile(durations_ms, 95)),
         },
         "finish_ms": result.finish_ms,
+        "why_untracked": why_untracked(recording, result.log) or None,
     }
     _write_summary(folder, summary)
     return summary
@@ -124,28 +136,10 @@ def print_alone(summary: dict[str, Any]) -> None:
             (f"{name} poses, scale error", f"{100 * error['scale_error']:+.2f} %"),
         ]
     title = f"{summary['robot']} alone, front end {summary['front_end']}"
-    caption = "errors by evo, of the camera's position, after the alignment named"
+    caption = summary["why_untracked"] or (
+        "errors by evo, of the camera's position, after the alignment named"
+    )
     print_table(TextTable(("", "here"), tuple(rows)), title, caption, bold=(1,))
-
-
-@dataclass(eq=False)
-class PairEvents:
-    """An onlooker that keeps what a run without truth reports: the numbers of aerial surfaces and
-    of those after which a position was claimed, and every refinement in order of time."""
-
-    surfaces: int = 0
-    located: int = 0
-    alignments: list[Alignment] = field(default_factory=list)
-
-    def see(self, seen: Seen) -> None:
-        """Count one event."""
-        match seen.event:
-            case SurfaceCast():
-                self.surfaces += 1
-            case BeliefUpdated(belief=belief):
-                self.located += belief.converged
-            case Aligned(alignment=alignment):
-                self.alignments.append(alignment)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +158,8 @@ def run_pair(pair: Pair, setup: Setup, seed: int, onlookers: Sequence[Onlooker] 
     A recording of ours that was exported and is read as a pair gives the same result as itself.
 
     Raises:
-        InputError: The setup takes the heading from magnetometers, and a robot has none.
+        InputError: The setup takes the heading from magnetometers, and a robot has none; or no
+            image of a robot was tracked.
     """
     if setup.config.localization.heading != "search":
         for recording in (pair.mav, pair.ground):
@@ -177,6 +172,10 @@ def run_pair(pair: Pair, setup: Setup, seed: int, onlookers: Sequence[Onlooker] 
     pipeline = pipeline_for(pair, setup, localizer_rng(seed, flight=0))
     events = PairEvents()
     driven = drive(pair, tracking, pipeline, setup, [events, *onlookers])
+    for robot, tracked in driven.tracked.items():
+        reason = why_untracked(pair.of(Source[robot.upper()]), tracked.front_end)
+        if reason:
+            raise InputError(reason)
     return PairResult(driven.tracked, pipeline.augmented_map(), events)
 
 
@@ -203,8 +202,11 @@ def write_pair(folder: Path, pair: Pair, setup: Setup, result: PairResult) -> di
         "replaced": setup.given.describe(),
         "aerial_surfaces": events.surfaces,
         "located": events.located,
+        "not_located": dict(events.not_located),
         "alignments": len(events.alignments),
         "accepted": len(accepted),
+        "refused": dict(events.refused),
+        "why": events.why(setup.config.fusion.min_depth_maps),
         "map_points": {
             robot.name.lower(): int((augmented.sources == robot).sum()) for robot in Source
         },
@@ -219,7 +221,9 @@ def print_pair(summary: dict[str, Any]) -> None:
     rows = [
         ("aerial surfaces", str(summary["aerial_surfaces"])),
         ("located after", str(summary["located"])),
+        *((f"not located, {kind}", str(n)) for kind, n in summary["not_located"].items()),
         ("alignments accepted", f"{summary['accepted']} of {summary['alignments']}"),
+        *((f"refused, {kind}", str(n)) for kind, n in summary["refused"].items()),
     ]
     for name, robot in summary["robots"].items():
         error = robot["error"]["final"]
@@ -231,7 +235,8 @@ def print_pair(summary: dict[str, Any]) -> None:
             rms = "truth unknown" if error is None else metres(error[key])
             rows.append((f"{name}: {label}", rms))
     title = f"both robots, preset {summary['preset']}"
-    print_table(TextTable(("", "here"), tuple(rows)), title, summary["replaced"], bold=(1,))
+    caption = "; ".join(filter(None, (summary["replaced"], summary["why"])))
+    print_table(TextTable(("", "here"), tuple(rows)), title, caption, bold=(1,))
 
 
 def _robot(

@@ -11,7 +11,7 @@ from airground.augmentation import AugmentedMap
 from airground.config import Config
 from airground.core.belief import Alignment, Belief
 from airground.core.cloud import Source
-from airground.core.events import Aligned, BeliefUpdated
+from airground.core.events import Aligned, BeliefUpdated, NotLocated
 from airground.core.se3 import SE3
 from airground.core.sighting import Sighting
 from airground.io.ply import write_ply
@@ -100,6 +100,7 @@ class RunRows:
         self.out = RowWriter(recording.scene, recording.seed, recording.flight, condition)
         self._recorded_s, self._truth = recording.duration_s, truth
         self._iterations = self._trials = 0
+        self._why_not_located = "no surface: no aerial map was made"
         self._belief: Belief | None = None
         self._T_ground_mav: SE3 | None = None
 
@@ -108,6 +109,8 @@ class RunRows:
         match seen.event:
             case BeliefUpdated(belief=belief) if seen.sighting is not None:
                 self._take_belief(belief, seen.sighting)
+            case NotLocated(reason=reason):
+                self._why_not_located = reason
             case Aligned() as event if seen.sighting is not None:
                 self._take_alignment(event.alignment, seen.sighting)
         if type(seen.event) in STAGE_OF:
@@ -122,8 +125,7 @@ class RunRows:
     def result(self, tracked: dict[str, Tracked], augmented: AugmentedMap) -> RunResult:
         """The outcome of the run, once the front ends have finished."""
         if self._iterations == 0:
-            reason = "no aerial map came while both robots knew their poses"
-            self.out.add_no_belief(reason, 0, 1)
+            self.out.add_no_belief(self._why_not_located, 0, 1)
         add_tracking(self.out, tracked["mav"], self._truth.T_world_mav_camera)
         add_tracking(self.out, tracked["ground"], self._truth.T_world_ground_camera)
         return RunResult(

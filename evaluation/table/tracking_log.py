@@ -117,10 +117,12 @@ class FrontEndLog:
         answers: One per image, in order of time, without corners.
         durations_ms: Processing time of each image and the inertial samples before it, with
             mapping, without decoding.
+        waiting: What the front end last waited for without a map; empty where it never did.
     """
 
     answers: AnswerLog = field(default_factory=AnswerLog)
     durations_ms: list[float] = field(default_factory=list)
+    waiting: str = ""
 
     def stamps_ns(self) -> NDArray[np.int64]:
         """(N,) stamp of each image."""
@@ -153,6 +155,7 @@ class WatchedFrontEnd(FrontEndLog, Generic[Image]):
         self.durations_ms.append(1e3 * (self._clock() - started + self._imu_s))
         self._imu_s = 0.0
         self.answers.append(answer)
+        self.waiting = answer.waiting or self.waiting
         return answer
 
     def finish(self) -> None:
@@ -163,7 +166,7 @@ class WatchedFrontEnd(FrontEndLog, Generic[Image]):
 
     def log(self) -> FrontEndLog:
         """The answers, without the front end."""
-        return FrontEndLog(self.answers, self.durations_ms)
+        return FrontEndLog(self.answers, self.durations_ms, self.waiting)
 
 
 @dataclass(frozen=True, eq=False)

@@ -55,7 +55,8 @@ class FrameToFrame:
         """The last pose and the motion since."""
         if not _can_be_aligned(image):
             lost = Tracking.INITIALIZING if self._previous is None else Tracking.LOST
-            return TrackedPose(image.stamp_ns, lost, None)
+            waiting = "an image with contrast and depth" if self._previous is None else ""
+            return TrackedPose(image.stamp_ns, lost, None, waiting=waiting)
         if self._previous is None:
             T_map_camera = self._start.T_map_camera()
         else:

@@ -39,8 +39,13 @@ class TrajectoryFile:
         nearest = min((before, after), key=lambda index: abs(int(stamps[index]) - stamp))
         if abs(int(stamps[nearest]) - stamp) <= self._step_ns / 2:
             return self._log.tracked(stamp, self._trajectory[nearest])
-        lost = Tracking.LOST if self._log.trajectory() else Tracking.INITIALIZING
-        return TrackedPose(stamp, lost, None)
+        if self._log.trajectory():
+            return TrackedPose(stamp, Tracking.LOST, None)
+        waiting = (
+            f"a pose near the image: the newest image is of {stamp * 1e-9:.3f} s, the poses are of "
+            f"{stamps[0] * 1e-9:.3f} to {stamps[-1] * 1e-9:.3f} s"
+        )
+        return TrackedPose(stamp, Tracking.INITIALIZING, None, waiting=waiting)
 
     def finish(self) -> None:
         """Nothing was put off."""

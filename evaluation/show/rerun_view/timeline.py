@@ -16,6 +16,7 @@ from airground.core.events import (
     Initializing,
     MapAugmented,
     MavTracked,
+    NotLocated,
     PosesCorrected,
     TrackingLost,
 )
@@ -151,6 +152,8 @@ def _mapping(event: Event) -> Message | None:
     match event:
         case PosesCorrected(robot=robot):
             return f"{NAMES[robot]}: map corrected, earlier poses moved", NOTE
+        case NotLocated(reason=reason):
+            return f"surface: not located, {reason}", BAD
         case BeliefUpdated(belief=belief) if belief.converged:
             return f"particles: converged, spread {belief.spread_m:.2f} m", GOOD
         case BeliefUpdated(belief=belief):

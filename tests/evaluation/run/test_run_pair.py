@@ -49,6 +49,14 @@ def euroc(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_euroc_folder(tmp_path_factory.mktemp("euroc"), mav_sequence(FRAMES))
 
 
+@pytest.fixture(scope="module")
+def mav_poses(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The flight is too short for poses of its own."""
+    file = tmp_path_factory.mktemp("poses") / "mav.tum"
+    write_tum(file, mav_sequence(FRAMES).T_world_camera)
+    return file
+
+
 def airground(*words: object) -> int:
     with pytest.raises(SystemExit) as ended:
         cli.main([str(word) for word in words])
@@ -89,16 +97,23 @@ def test_the_calibration_of_an_export_is_read_back(small: Path, tmp_path: Path) 
         assert np.rad2deg(np.arccos(min(up, 1.0))) < 15  # the MAV leans into its flight
 
 
-def test_both_plain_folders_run(tum: Path, euroc: Path, tmp_path: Path) -> None:
+def test_both_plain_folders_run(
+    tum: Path, euroc: Path, mav_poses: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "out"
-    words = ("run", "--mav", euroc, "--ground", tum, "--heading", "search", "--out", out)
+    words = ["run", "--mav", euroc, "--ground", tum, "--heading", "search", "--out", out]
+    words += ["--mav-trajectory", mav_poses]
     assert airground(*words) == console.EXIT_OK
     made = json.loads((out / "summary.json").read_text())
     assert made["schema"] == "airground-pair"
-    assert made["replaced"] == ""
+    assert made["replaced"] == "MAV poses from a file"
     for robot, layout in (("mav", "euroc"), ("ground", "tum")):
         assert made["robots"][robot]["images"] == FRAMES
         assert made["robots"][robot]["layout"] == layout
+    assert made["aerial_surfaces"] == made["located"] == made["alignments"] == 0
+    assert (made["not_located"], made["refused"]) == ({}, {})
+    assert re.match(r"no surface: the MAV's camera moved \d\.\d\d m while it was tr", made["why"])
+    assert made["why"] in " ".join(capsys.readouterr().out.split())
     assert made["robots"]["ground"]["tracked_fraction"] == 1.0
     assert made["robots"]["ground"]["error"]["final"]["ate_se3_rmse_m"] < 0.02
     assert len(read_tum(out / "ground.tum")) == FRAMES
@@ -107,10 +122,28 @@ def test_both_plain_folders_run(tum: Path, euroc: Path, tmp_path: Path) -> None:
     assert (out / "config.toml").exists()
 
 
-def test_rerun_without_truth_shows_the_rest_and_changes_no_result(
-    tum: Path, euroc: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("verb", ["track", "run"])
+def test_no_tracked_image_is_an_error_with_its_reason(
+    verb: str, tum: Path, euroc: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ("run", "--mav", euroc, "--ground", tum, "--heading", "search")
+    words: tuple[object, ...] = ("track", euroc)
+    if verb == "run":
+        words = ("run", "--mav", euroc, "--ground", tum, "--heading", "search")
+    assert airground(*words, "--out", tmp_path / "out") == console.EXIT_ERROR
+    error = capsys.readouterr().err.splitlines()[-1]
+    assert re.search(
+        r"none of the 12 images \(0\.4 s\) of the mav was tracked; the front end still waited for "
+        r"the scale: \d keyframes in 0\.\d s do not show it yet",
+        error,
+    ), error
+    assert not list(tmp_path.iterdir())
+
+
+def test_rerun_without_truth_shows_the_rest_and_changes_no_result(
+    tum: Path, euroc: Path, mav_poses: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["run", "--mav", euroc, "--ground", tum, "--heading", "search"]
+    words += ["--mav-trajectory", mav_poses]
     drawn, plain = tmp_path / "drawn", tmp_path / "plain"
     assert (
         airground(*words, "--rerun", "--set", "rerun.level=all", "--out", drawn) == console.EXIT_OK
