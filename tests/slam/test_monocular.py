@@ -35,7 +35,7 @@ def test_a_map_given_up_takes_all_that_was_known_of_its_unit_along(config: Confi
     assert set(answers) == {Tracking.INITIALIZING}
     assert re.match(r"the scale: .*\d keyframes in \d\.\d s", waiting[DARK - 1])
     expected = (
-        "a first view with corners: 0 in the newest, 60 are needed (a map was given up before)"
+        "a first view with corners: 0 in the newest, 30 are needed (a map was given up before)"
     )
     assert waiting[-1] == expected
     # What begins now is between two views, in an unknown unit.
