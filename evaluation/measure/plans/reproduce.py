@@ -108,8 +108,14 @@ class Plan:
             baselines=self.protocol.baselines > 0,
             negatives=negatives,
             stranger=None if stranger is None else where(stranger),
+            appearance=flight if self._matches_images(flight) else None,
         )
         return [primary, *others]
+
+    def _matches_images(self, flight: Flight) -> bool:
+        """Whether images of its world are matched: once, since other flights have the same."""
+        once = flight in self.flights and flight.flight == 0
+        return once and self.protocol.baselines > 0 and _has_places(flight)
 
     def _flown(
         self, flights: list[Flight], recordings: Path | None, store: UnitStore, crew: Crew

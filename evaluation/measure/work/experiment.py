@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from airground.io.recording import Recording
+from evaluation.measure.baselines.appearance import add_appearance
 from evaluation.measure.baselines.measure import add_baselines
 from evaluation.measure.close_up import CloseUp
 from evaluation.measure.protocol.error_budget import add_error_budget
@@ -112,6 +113,8 @@ def _measured(
     if unit.baselines and protocol.baselines:
         counts = (protocol.trials, protocol.baselines)
         add_baselines(out, recording, truth, config, maps, seed, counts)
+    if unit.appearance is not None:
+        add_appearance(out, unit.appearance)
     if unit.negatives:
         add_negatives(out, maps, stranger, truth, config, seed, protocol)
     return ResultTable.from_rows(out.rows)

@@ -40,6 +40,8 @@ class Unit:
         negatives: Whether to measure the negative cases.
         stranger: Another scene's recording, as `recording`, whose ground map is the wrong map of
             the negative cases; None leaves that case out.
+        appearance: The flight in whose world single images are matched under varied appearance;
+            None leaves that out.
     """
 
     recording: Path | Flight
@@ -52,6 +54,7 @@ class Unit:
     baselines: bool = False
     negatives: bool = False
     stranger: Path | Flight | None = None
+    appearance: Flight | None = None
 
     def made_from(self) -> dict[str, Any]:
         """Everything that the rows depend on, as JSON data; raises InputError if the recording is
@@ -73,6 +76,7 @@ class Unit:
             "baselines": self.baselines,
             "negatives": self.negatives,
             "stranger": None if self.stranger is None else _described(self.stranger),
+            "appearance": None if self.appearance is None else _described(self.appearance),
         }
 
     def key(self) -> str:
@@ -82,7 +86,8 @@ class Unit:
     @property
     def has_extras(self) -> bool:
         """Whether it has measurements that only the first unit of a group may have."""
-        return self.showcase or self.budget or self.baselines or self.negatives
+        asked = self.showcase, self.budget, self.baselines, self.negatives, self.appearance
+        return any(extra not in (False, None) for extra in asked)
 
     def maps_like(self, other: Unit) -> bool:
         """Whether one pass of mapping serves both."""

@@ -25,6 +25,7 @@ from evaluation.show.figures.fig13_14_refinement_error import (
 from evaluation.show.figures.showcase_figures import showcase_figures
 from evaluation.show.figures.style import SERIES, ReportFigure
 from evaluation.show.figures.table1_timing import timing_figure
+from evaluation.show.report.appearance import appearance_figures
 from evaluation.show.report.calibration import calibration_figures
 from evaluation.show.report.error_budget import budget_figure
 from evaluation.show.report.trajectories import trajectory_figures
@@ -57,6 +58,7 @@ def report_figures(
     if showcase is not None:
         yield from showcase_figures(showcase)
     drawn = _chosen(table, conditions)
+    yield from appearance_figures(drawn[0].table, conditions[0])
     if conditions[0].poses != "oracle exact":
         yield from trajectory_figures(table, [d.condition for d in drawn])
     yield from localization_figures(drawn)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -137,6 +138,16 @@ def test_negatives_are_tried_on_the_primary_setup_of_flights_with_something_to_f
     for flight in (flat, further):
         found = {(unit.negatives, unit.stranger) for unit in plan.units(flight)}
         assert found == {(False, None)}
+
+
+def test_images_are_matched_once_over_each_world_with_something_to_find() -> None:
+    plan = plan_of("tiny", "flat")
+    matched = replace(plan, protocol=Protocol(baselines=2))
+    assert all(unit.appearance is None for f in plan.flights for unit in plan.units(f))
+    chosen = [matched.units(flight)[0].appearance for flight in matched.flights]
+    assert chosen == [matched.flights[0], None, None, None]
+    assert matched.units(matched.flights[0])[1].appearance is None
+    assert matched.units(next(matched.further_flights()))[0].appearance is None
 
 
 def test_options_set_the_amount(tmp_path: Path) -> None:

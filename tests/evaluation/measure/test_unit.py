@@ -60,6 +60,9 @@ OTHERS: dict[str, list[Unit]] = {
         replace(UNIT, stranger=stranger)
         for stranger in (FLIGHT, replace(FLIGHT, seed=4), replace(FLIGHT, scene=load_scene("flat")))
     ],
+    "appearance": [
+        replace(UNIT, appearance=flight) for flight in (FLIGHT, replace(FLIGHT, seed=4))
+    ],
 }
 
 
