@@ -91,7 +91,7 @@ class Terrain(Part):
     stones_per_m2: Annotated[float, Field(ge=0, le=400)] = 0.0
     """Small stones of 2 to 9 cm, which stand out of the ground [1/m^2]."""
     plants_per_m2: Annotated[float, Field(ge=0, le=60)] = 0.0
-    """Low plants, each a rosette of leaves of 8 to 20 cm [1/m^2]."""
+    """Low plants on ground and rocks, each a rosette of leaves of 8 to 20 cm [1/m^2]."""
 
 
 class Light(Part):

@@ -1,14 +1,15 @@
-"""Small stones and low plants on natural ground: one mesh of many curved patches."""
+"""Small stones and low plants on natural ground and rocks: one mesh of many curved patches."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.arrays import read_only
-from sim.geometry.surface import Mesh, join
+from sim.geometry.surface import Mesh, RayCaster, join
 from sim.geometry.terrain import HeightField
 from sim.scene import Terrain
 
@@ -58,11 +59,14 @@ class GroundCover:
         return join(_grids(patches) for patches in self.patches())
 
 
-def grow_cover(terrain: Terrain, ground: HeightField, rng: np.random.Generator) -> GroundCover:
-    """Scatter the stones and plants of `terrain` over the ground."""
+def grow_cover(
+    terrain: Terrain, ground: HeightField, rocks: Sequence[Mesh], rng: np.random.Generator
+) -> GroundCover:
+    """Scatter the stones of `terrain` over the ground, and its plants over ground and rocks."""
     area = np.minimum(np.array(terrain.area_m) + 2 * MARGIN_M, ground.size_m - 0.2)
     stones = _stones(round(terrain.stones_per_m2 * area.prod()), area, ground, rng)
-    leaves = _leaves(round(terrain.plants_per_m2 * area.prod()), area, ground, rng)
+    surface = join([ground.mesh(), *rocks])
+    leaves = _leaves(round(terrain.plants_per_m2 * area.prod()), area, surface, rng)
     return GroundCover(stones, leaves)
 
 
@@ -103,13 +107,13 @@ def _stones(
     rim[1:-1, 1:-1] = False
     nodes[:, rim, 2] = np.minimum(nodes[:, rim, 2], -_SUNK)
     angles = rng.uniform(0, 2 * np.pi, count)
-    return _placed(nodes * radii[:, None, None, None], angles, places, ground)
+    return _placed(nodes * radii[:, None, None, None], angles, places, ground.at(*places.T))
 
 
 def _leaves(
-    plants: int, area: NDArray, ground: HeightField, rng: np.random.Generator
+    plants: int, area: NDArray, surface: Mesh, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Leaves that rise from one place in all directions and droop."""
+    """Leaves that rise from one place of a surface in all directions and droop."""
     count = plants * LEAVES
     places = np.repeat(rng.uniform(-area / 2, area / 2, (plants, 2)), LEAVES, axis=0)
     lengths = np.repeat(rng.uniform(*LEAF_M, plants), LEAVES) * rng.uniform(0.6, 1.0, count)
@@ -122,18 +126,30 @@ def _leaves(
     nodes = np.stack(np.broadcast_arrays(along, side, up), axis=-1)
     nodes /= np.sqrt(1 + rise**2)[..., None]  # lengths count along the slope
     angles = rng.uniform(0, 2 * np.pi, count)
-    return _placed(nodes * lengths[:, None, None, None], angles, places, ground)
+    heights = _heights(surface, places)
+    return _placed(nodes * lengths[:, None, None, None], angles, places, heights)
+
+
+def _heights(surface: Mesh, places: NDArray) -> NDArray[np.float64]:
+    """(K,) height of the highest surface at places (K, 2) [m]."""
+    if len(places) == 0:
+        return np.empty(0)
+    above = float(surface[0][:, 2].max()) + 1.0
+    rays = np.zeros((len(places), 6), np.float32)
+    rays[:, :2], rays[:, 2], rays[:, 5] = places, above, -1.0
+    return above - RayCaster(surface).hits(rays)[0].astype(np.float64)
 
 
 def _placed(
-    nodes: NDArray, angles: NDArray, places: NDArray, ground: HeightField
+    nodes: NDArray, angles: NDArray, places: NDArray, heights: NDArray
 ) -> NDArray[np.float64]:
-    """Patches turned about the vertical by `angles` (K,) [rad], put on the ground at `places`."""
+    """Patches turned about the vertical by `angles` (K,) [rad], put at `places` (K, 2) and
+    `heights` (K,)."""
     c, s = np.cos(angles)[:, None, None], np.sin(angles)[:, None, None]
     x, y = nodes[..., 0], nodes[..., 1]
     turned = np.stack([c * x - s * y, s * x + c * y, nodes[..., 2]], axis=-1)
     turned[..., :2] += places[:, None, None]
-    turned[..., 2] += ground.at(*places.T)[:, None, None]
+    turned[..., 2] += heights[:, None, None]
     return turned
 
 

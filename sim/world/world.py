@@ -101,8 +101,9 @@ def _build_outdoor(
 ) -> World:
     ground = make_terrain(scene.room.size_m, terrain.relief_m, terrain.clods_m, geometry_rng)
     rocks = scatter_rocks(scene, ground, geometry_rng)
-    cover = grow_cover(terrain, ground, geometry_rng)
-    things = [rock.mesh() for rock in rocks] + [cover.mesh()]
+    rock_meshes = [rock.mesh() for rock in rocks]
+    cover = grow_cover(terrain, ground, rock_meshes, geometry_rng)
+    things = [*rock_meshes, cover.mesh()]
     spec = _empty_spec(pictures)
     baker = _baker(scene, ground.mesh(), things, _SOIL, _STONE) if pictures else None
     add_ground(spec, ground, scene, baker, picture_rng)

@@ -7,6 +7,7 @@ import pytest
 
 from sim.geometry.ground_cover import LEAVES, GroundCover, grow_cover, patch_normals
 from sim.geometry.rocks import scatter_rocks
+from sim.geometry.surface import rectangle_mesh
 from sim.geometry.terrain import HeightField, make_terrain
 from sim.scene import Scene, Terrain, load_scene
 from sim.world.world import build_world
@@ -20,7 +21,7 @@ def flat_ground() -> HeightField:
 
 def cover_of(stones: float, plants: float, seed: int = 0) -> GroundCover:
     terrain = Terrain(area_m=(1.0, 1.0), stones_per_m2=stones, plants_per_m2=plants)
-    return grow_cover(terrain, flat_ground(), np.random.default_rng(seed))
+    return grow_cover(terrain, flat_ground(), [], np.random.default_rng(seed))
 
 
 def outdoor(**changes: object) -> Scene:
@@ -49,6 +50,14 @@ def test_stones_and_leaves_face_up_and_undersides_down() -> None:
     assert (patch_normals(stones)[:, 1:-1, 1:-1, 2] > 0).mean() > 0.9
     assert (patch_normals(leaves)[..., 2] > 0).all()
     assert (patch_normals(undersides)[..., 2] < 0).all()
+
+
+def test_plants_grow_on_rocks_and_stones_lie_beneath_them() -> None:
+    terrain = Terrain(area_m=(1.0, 1.0), stones_per_m2=50, plants_per_m2=50)
+    table = rectangle_mesh(np.array([-2.0, -2, 0.5]), np.array([4.0, 0, 0]), np.array([0, 4.0, 0]))
+    cover = grow_cover(terrain, flat_ground(), [table], np.random.default_rng(0))
+    np.testing.assert_allclose(cover.leaves[:, :, 0, 2], 0.5, atol=1e-5)
+    assert cover.stones[..., 2].max() < 0.1
 
 
 def test_the_mesh_has_every_patch() -> None:
