@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import pytest
@@ -18,8 +19,9 @@ from evaluation.measure.protocol.trials import Protocol
 from evaluation.measure.work.crew import Crew
 from evaluation.measure.work.measure import recording_name
 from evaluation.measure.work.unit import Finished, Unit, UnitStore
+from evaluation.setup import published
 from evaluation.setup.setups import Setup, with_companions
-from evaluation.table.rows import ResultTable, Row
+from evaluation.table.rows import UNSCORED_SCENES, ResultTable, Row
 from sim.scene import load_scene
 from sim.sensors.presets import NOMINAL
 
@@ -156,3 +158,37 @@ def test_options_set_the_amount(tmp_path: Path) -> None:
     more = ("protocol.sequences_per_flight=14",)
     plan = Reproduce(out=tmp_path, sequences=500, overrides=more).plan()
     assert (plan.protocol.sequences, plan.sequences) == (14, 500)
+
+
+def test_each_flight_over_a_heap_of_its_own() -> None:
+    scenes = [load_scene("tiny"), load_scene("flat")]
+    flown = flights_over(scenes, 2, NOMINAL, 5, heaps=True)
+    assert [(f.scene.name, f.seed, f.flight) for f in flown] == [
+        ("tiny", 5, 0), ("tiny", 6, 0), ("flat", 5, 0), ("flat", 6, 0),
+    ]  # fmt: skip
+    further = Plan(flown, [Setup(Config())], Protocol(), sequences=99).further_flights()
+    assert [(f.scene.name, f.seed) for f in islice(further, 3)] == [
+        ("tiny", 7), ("tiny", 8), ("tiny", 9),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("preset", ["paper", "paper_literal"])
+def test_the_papers_presets_repeat_the_papers_experiments(preset: str, tmp_path: Path) -> None:
+    plan = Reproduce(out=tmp_path / "out", preset=preset).plan()  # type: ignore[arg-type]
+    indoors = [f for f in plan.flights if f.scene.name not in UNSCORED_SCENES]
+    assert len({(f.scene.name, f.seed) for f in plan.flights}) == len(plan.flights)
+    assert {flight.sensors.name for flight in plan.flights} == {"paper"}
+    assert {setup.poses for setup in plan.setups} == {"slam"}
+    assert len(indoors) * plan.protocol.sequences >= published.SEQUENCES.value
+    assert len(indoors) * plan.protocol.trials >= published.REFINEMENT_TRIALS.value
+    names = [setup.config.preset for setup in plan.setups]
+    assert names[0] == preset
+    assert sorted(names) == ["best", "paper", "paper_literal"]
+
+
+def test_named_sensors_and_scenes_win_over_those_of_the_paper(tmp_path: Path) -> None:
+    asked = Reproduce(out=tmp_path / "out", preset="paper", scenes=("tiny",), sensors="none")
+    (*flights,) = asked.plan().flights
+    assert {(f.scene.name, f.sensors.name) for f in flights} == {("tiny", "none")}
+    quick = Reproduce(out=tmp_path / "out", preset="paper", quick=True).plan()
+    assert [(f.scene.name, f.sensors.name) for f in quick.flights] == [("tiny", "paper")]
