@@ -53,10 +53,10 @@ class Extent:
 FULL = Extent(("indoor_a", "indoor_b", "indoor_c", "outdoor", "flat"), 2, 6, 9, 12)
 """Over four scenes with structure: 48 sequences and 72 trials."""
 TWIN = Extent(
-    ("paper_a", "paper_b", "paper_c", "paper_outdoor"), 3, 5, 8, 7,
+    ("paper_a", "paper_b", "paper_c", "paper_outdoor"), 2, 7, 12, 10,
     heaps=True, sensors="paper", negatives=False,
 )  # fmt: skip
-"""The paper's four datasets: indoors 45 sequences and 72 trials, where the paper has 41 and 67;
+"""The paper's four datasets: indoors 42 sequences and 72 trials, where the paper has 41 and 67;
 outdoors pictures and matches of images."""
 QUICK = Extent(("tiny",), 1, 4, 8, 0)
 

@@ -113,9 +113,10 @@ class Plan:
         return [primary, *others]
 
     def _matches_images(self, flight: Flight) -> bool:
-        """Whether images of its world are matched: once, since other flights have the same."""
-        once = flight in self.flights and flight.flight == 0
-        return once and self.protocol.baselines > 0 and _has_places(flight)
+        """Whether images of its world are matched: of one world a scene, since each takes
+        minutes."""
+        of_scene = [other for other in self.flights if other.scene == flight.scene]
+        return self.protocol.baselines > 0 and _has_places(flight) and flight == of_scene[0]
 
     def _flown(
         self, flights: list[Flight], recordings: Path | None, store: UnitStore, crew: Crew
