@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Callable
 from pathlib import Path
 
@@ -59,6 +60,10 @@ def test_colour_may_be_jpeg(folder: Path) -> None:
 JPEG_DAMAGE: dict[str, tuple[Callable[[bytes], bytes], str]] = {
     "truncated": (lambda data: data[:-300], "cannot be decoded: the JPEG image is damaged"),
     "header": (lambda data: data[:20], "cannot be decoded: the JPEG image is damaged"),
+    "huge": (
+        lambda data: data.replace(struct.pack(">HH", 480, 640), struct.pack(">HH", 60000, 60000)),
+        "is 60000x60000, the calibration says 640x480",
+    ),
     "no image": (lambda data: b"GIF89a" + data, "is no PNG or JPEG image"),
 }
 
