@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from airground.config import Config, paper
+from airground.config import Config, paper, paper_literal
 from airground.core.events import BeliefUpdated, CostMapComputed, HeightMapsMade
 from airground.core.se3 import SE3
 from airground.localization.height_map_pair import HeightMapPair
@@ -87,8 +87,9 @@ def test_paper_computes_the_cost_map_once_and_best_each_time(flight):
     assert [len(update) for update in flight.localize(Config())] == [3] * 4
 
 
-def test_sigma_as_published_on_square_metres_never_converges(flight):
-    assert not any(belief.converged for belief in beliefs(flight.localize(paper())))
+def test_the_published_sigma_converges_as_the_paper_has_it_and_never_in_square_metres(flight):
+    assert beliefs(flight.localize(paper()))[-1].converged
+    assert not any(belief.converged for belief in beliefs(flight.localize(paper_literal())))
 
 
 def test_same_seed_same_belief(flight):
@@ -101,7 +102,7 @@ def test_same_seed_same_belief(flight):
     [
         Config(),
         paper(),
-        changed(paper(), sigma_units="minmax"),
+        changed(paper_literal(), sigma_units="minmax"),
         changed(Config(), heading="search"),
     ],
     ids=["best", "paper", "minmax", "search"],
