@@ -62,9 +62,8 @@ def _from_table(table: dict[str, Any], name: str) -> Callable[[Sequence], FrontE
 
 def _oracle(sequence: Sequence) -> FrontEnd[Any]:
     path = sequence.T_world_camera
-    return Oracle(
-        path.at, path.stamps_ns, np.zeros((len(path), 3)), EXACT, np.random.default_rng(0)
-    )
+    exact = np.zeros((len(path), 3))
+    return Oracle(path.at, path.stamps_ns, exact, exact, EXACT, np.random.default_rng(0))
 
 
 CASES = {

@@ -47,7 +47,9 @@ def test_files_have_live_and_final_poses_of_the_body(tmp_path: Path) -> None:
     mav: WatchedFrontEnd = WatchedFrontEnd(Corrected())
     for stamp in STAMPS:
         mav.track(MavImage(stamp, np.zeros((4, 4), np.uint8)))
-    recording: Any = SimpleNamespace(T_pose_camera=T_BODY_IMU @ T_IMU_CAMERA)
+    recording: Any = SimpleNamespace(
+        T_pose_camera=T_BODY_IMU @ T_IMU_CAMERA, published_stamps=lambda stamps_ns: stamps_ns
+    )
     write_paths(tmp_path, "mav", recording, mav, mav.trajectory())
     write_paths(tmp_path, "ground", recording, WatchedFrontEnd(Corrected()), None)
     assert {file.name for file in tmp_path.iterdir()} == {"mav.tum", "mav_live.tum"}
