@@ -137,7 +137,7 @@ class ConfigOptions:
     preset: Annotated[Literal["best", "paper", "paper_literal"] | None, Shown("NAME", "best")] = (
         None
     )
-    """best, paper (as published) or paper_literal (sigma as printed)"""
+    """best, paper (as published), or paper_literal (sigma too)"""
     config: Annotated[Path | None, Shown("FILE")] = None
     """TOML file with any parameters (docs/parameters.md)"""
     overrides: Annotated[
