@@ -38,6 +38,7 @@ class Extent:
         heaps: Whether every flight is over a heap of its own.
         sensors: Sensor preset.
         negatives: Whether negative cases are tried.
+        only_images: Whether only the baselines that match images are tried.
     """
 
     scenes: tuple[str, ...]
@@ -48,13 +49,14 @@ class Extent:
     heaps: bool = False
     sensors: str = "nominal"
     negatives: bool = True
+    only_images: bool = False
 
 
 FULL = Extent(("indoor_a", "indoor_b", "indoor_c", "outdoor", "flat"), 2, 6, 9, 12)
 """Over four scenes with structure: 48 sequences and 72 trials."""
 TWIN = Extent(
     ("paper_a", "paper_b", "paper_c", "paper_outdoor"), 2, 7, 12, 10,
-    heaps=True, sensors="paper", negatives=False,
+    heaps=True, sensors="paper", negatives=False, only_images=True,
 )  # fmt: skip
 """The paper's four datasets: indoors 42 sequences and 72 trials, where the paper has 41 and 67;
 outdoors pictures and matches of images."""
@@ -199,6 +201,7 @@ class Reproduce(
             ),
             trials=self._count("trials", asked.trials, extent.trials),
             baselines=self._count("baselines", asked.baselines, extent.baselines, low=0),
+            only_images=extent.only_images,
         )
 
     def _count(self, word: str, asked: int | None, usual: int, low: int = 1) -> int:

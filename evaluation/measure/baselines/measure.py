@@ -16,7 +16,12 @@ from evaluation.measure.baselines.interface import Answer, Baseline, Given
 from evaluation.measure.baselines.table import BASELINES
 from evaluation.measure.baselines.views import GroundViews, aerial_view
 from evaluation.measure.protocol.mapping_pass import Maps
-from evaluation.measure.protocol.trials import noisy_start, spread_evenly, trial_sightings
+from evaluation.measure.protocol.trials import (
+    Protocol,
+    noisy_start,
+    spread_evenly,
+    trial_sightings,
+)
 from evaluation.table.row_writer import RowWriter
 from evaluation.table.truth_errors import pose_error, true_T_ground_mav
 from sim.recording.truth import Truth
@@ -34,26 +39,31 @@ def add_baselines(
     config: Config,
     maps: Maps,
     seed: tuple[int, int],
-    counts: tuple[int, int],
+    protocol: Protocol,
 ) -> None:
-    """Write one answer of every baseline for some of the refinement trials.
+    """Write one answer of every baseline asked for to some of the refinement trials.
 
     Rows have the numbers of these trials; the noisy prior is the start of that trial. `seed` holds
-    the seeds of the recording and the flight; `counts` the number of refinement trials, and how
-    many of them are used here.
+    the seeds of the recording and the flight.
     """
-    chosen = trial_sightings(len(maps.sightings), counts[0])
+    chosen = trial_sightings(len(maps.sightings), protocol.trials)
     ground_views = GroundViews(recording, maps.tracked["ground"].front_end.live_poses())
-    installed = [baseline for baseline in BASELINES if _is_installed(baseline)]
-    for baseline in BASELINES:
+    asked = baselines_asked(protocol)
+    installed = [baseline for baseline in asked if _is_installed(baseline)]
+    for baseline in asked:
         if baseline not in installed:
             reason = f"{baseline.module} is not installed (airground[baselines])"
             out.add(STAGE, f"{baseline.name}_missing", 1.0, "", note=reason)
-    for trial in spread_evenly(len(chosen), counts[1]):
+    for trial in spread_evenly(len(chosen), protocol.baselines):
         sighting = maps.sightings[chosen[trial]]
         answers = ask_all(installed, recording, ground_views, sighting, truth, config, seed, trial)
         for baseline, (answer, duration_ms) in zip(installed, answers, strict=True):
             _add_answer(out, baseline.name, answer, duration_ms, sighting, truth, trial)
+
+
+def baselines_asked(protocol: Protocol) -> list[Baseline]:
+    """The baselines that `protocol` asks for, in the order of the table."""
+    return [baseline for baseline in BASELINES if baseline.views or not protocol.only_images]
 
 
 def ask_all(

@@ -41,6 +41,7 @@ class Protocol:
         sequences: Number of sequences of aerial maps.
         trials: Number of refinements from a noisy start.
         baselines: Number of these trials on which every baseline is measured too.
+        only_images: Whether only the baselines that match images are measured.
         sequence_length: Number of aerial maps in a sequence.
         wide_searches: Number of aerial maps that are searched for one by one in a wider region.
     """
@@ -48,6 +49,7 @@ class Protocol:
     sequences: int = 7
     trials: int = 12
     baselines: int = 0
+    only_images: bool = False
     sequence_length: int = SEQUENCE_LENGTH
     wide_searches: int = 0
 

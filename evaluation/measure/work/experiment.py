@@ -111,8 +111,7 @@ def _measured(
     if unit.budget:
         add_error_budget(out, recording, truth, setup, maps, seed)
     if unit.baselines and protocol.baselines:
-        counts = (protocol.trials, protocol.baselines)
-        add_baselines(out, recording, truth, config, maps, seed, counts)
+        add_baselines(out, recording, truth, config, maps, seed, protocol)
     if unit.appearance is not None:
         add_appearance(out, unit.appearance)
     if unit.negatives:

@@ -15,7 +15,12 @@ from evaluation.commands.reproduce import Reproduce
 from evaluation.measure.baselines import measure
 from evaluation.measure.baselines.interface import Answer, Baseline, Given
 from evaluation.measure.baselines.table import BASELINES
-from evaluation.measure.protocol.trials import refine_sighting, spread_evenly, trial_sightings
+from evaluation.measure.protocol.trials import (
+    Protocol,
+    refine_sighting,
+    spread_evenly,
+    trial_sightings,
+)
 from evaluation.setup.condition import Condition
 from evaluation.show.report.baselines import baseline_table, baseline_trials
 from evaluation.table.row_writer import RowWriter
@@ -163,6 +168,15 @@ def test_reproduce_says_on_how_many_trials(words: tuple[str, ...], count: int) -
     verb = parse("reproduce", ["--out", "x", *words])
     assert isinstance(verb, Reproduce)
     assert verb.plan().protocol.baselines == count
+
+
+def test_the_twin_tries_the_baselines_that_match_images() -> None:
+    verb = parse("reproduce", ["--out", "x", "--preset", "paper"])
+    assert isinstance(verb, Reproduce)
+    protocol = verb.plan().protocol
+    assert protocol.baselines == 10
+    assert [baseline.name for baseline in measure.baselines_asked(protocol)] == ["sift", "asift"]
+    assert measure.baselines_asked(Protocol()) == list(BASELINES)
 
 
 def test_a_negative_number_of_trials_is_refused() -> None:
