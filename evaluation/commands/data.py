@@ -1,4 +1,4 @@
-"""`airground simulate`, `inspect`, `export`: datasets made, checked, and written for others."""
+"""Datasets made, checked, and written for others: `simulate`, `render`, `inspect`, `export`."""
 
 from __future__ import annotations
 
@@ -105,6 +105,45 @@ class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
         expected_s = work_s(seconds * RENDER_S_PER_S, self.workers())
         announce(f"records {len(plan.worlds)} worlds, {seconds:.0f} s in all", expected_s)
         make_dataset(plan, self.out, jobs, self.workers())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Render(Verb):
+    """Add exact truth of every pixel to a recording: depth, normals, things, optical flow.
+
+    It follows from the stored motion and surface, without simulating again. docs/datasets.md has
+    the encodings.
+    """
+
+    recording: Annotated[Positional[Path], Shown("RECORDING")]
+    """folder that simulate has written"""
+    add: Annotated[str, Shown("LIST")]
+    """what to add, of depth, normals, segmentation, flow; as in depth,flow"""
+    robot: Literal["mav", "ground", "both"] = "both"
+    """robot whose images are rendered"""
+    every: Annotated[int, Shown("N")] = 1
+    """every so many-th image; flow leads to the next of all images"""
+    out: Annotated[Path | None, Shown("DIR", "truth/ in the recording")] = None
+    """folder for ROBOT_depth/ and so on; these must not exist"""
+
+    def main(self) -> None:
+        from evaluation.datasets.pixel_truth_files import (
+            Wanted,
+            count_images,
+            parse_modalities,
+            render_truth,
+        )
+        from evaluation.datasets.simulated import Simulated
+        from evaluation.setup.progress import step
+        from sim.robots.motion import ROBOTS
+
+        robots = ROBOTS if self.robot == "both" else (self.robot,)
+        every = int(in_range("--every", self.every, low=1))
+        wanted = Wanted(robots, parse_modalities(self.add), every)
+        simulated = Simulated.open(self.recording)
+        out = simulated.truth.folder if self.out is None else self.out
+        with step("rendering", count_images(simulated, wanted), "images") as rendering:
+            render_truth(simulated, wanted, out, self.workers(), rendering.advance)
 
 
 @dataclass(frozen=True, kw_only=True)

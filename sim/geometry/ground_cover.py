@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.arrays import read_only
+from sim.geometry.parts import Part
 from sim.geometry.surface import Mesh, RayCaster, join
 from sim.geometry.terrain import HeightField
 from sim.scene import Terrain
@@ -57,6 +58,18 @@ class GroundCover:
     def mesh(self) -> Mesh:
         """All patches in this order; no node is shared, for each patch has its own picture."""
         return join(_grids(patches) for patches in self.patches())
+
+    def parts(self) -> list[Part]:
+        """Stones and plants, in the order of the mesh; a plant is all its leaves."""
+        stone, leaf = (
+            2 * (rows - 1) * (columns - 1) for rows, columns in (STONE_NODES, LEAF_NODES)
+        )
+        stones = [Part(f"stone_{k:05d}", "stone", stone) for k in range(len(self.stones))]
+        plants = [
+            Part(f"plant_{k:05d}", "plant", leaf * LEAVES)
+            for k in range(len(self.leaves) // LEAVES)
+        ]
+        return [*stones, *plants, *plants]  # upper sides, then lower sides
 
 
 def grow_cover(

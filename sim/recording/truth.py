@@ -1,8 +1,9 @@
 """The truth of a recording: written beside it, read only by the evaluator.
 
 `truth/` holds `mav.tum` and `ground.tum` (T_world_body at the IMU's rate), `surface.ply`
-(the mesh of all that can be seen), `boxes.csv`, `calibration.toml` (the real one, in the
-schema of the nominal one) and `motion.npz` (the exact states).
+(the mesh of all that can be seen), `parts.csv` (what its triangles belong to), `boxes.csv`,
+`calibration.toml` (the real one, in the schema of the nominal one) and `motion.npz` (the exact
+states).
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from airground.io.calibration import CalibrationTable, RobotTable
 from airground.io.header import parse_table, read_toml, write_toml
 from airground.io.layout import TRUTH
 from airground.io.tum import write_tum
+from sim.geometry.parts import write_parts
 from sim.robots.motion import ROBOTS, Motion, Robot
 from sim.world.world import World
 
@@ -126,6 +128,7 @@ def write_truth(
     )
     if not o3d.io.write_triangle_mesh(folder / "surface.ply", mesh):
         raise OSError(f"{folder / 'surface.ply'}: cannot be written")
+    write_parts(folder / "parts.csv", world.parts)
     _write_boxes(folder / "boxes.csv", world)
 
 

@@ -12,6 +12,7 @@ from sim.appearance.floor import paint_concrete, paint_plain, paint_plaster, pai
 from sim.appearance.pictures import add_picture
 from sim.appearance.sheet import faded, light_up
 from sim.geometry.noise import Image
+from sim.geometry.parts import Part
 from sim.geometry.surface import Mesh, join, rectangle_mesh
 from sim.scene import Room
 
@@ -142,6 +143,12 @@ def room_mesh(room: Room) -> Mesh:
             rectangle_mesh(corner, 2 * half_width * right, np.array([0, 0, room.wall_height_m]))
         )
     return join(meshes)
+
+
+def room_parts(room: Room) -> list[Part]:
+    """Floor and walls, in the order of the mesh."""
+    walls = [Part(f"wall_{k}", "wall", 2) for k in range(len(_walls(room)))]
+    return [Part("floor", "ground", 2), *walls]
 
 
 def _walls(room: Room) -> list[tuple[NDArray, NDArray, float]]:

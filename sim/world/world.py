@@ -15,13 +15,14 @@ from sim.appearance.cardboard import Make
 from sim.appearance.pictures import add_picture, paint_boxes
 from sim.appearance.print_marks import BRANDS
 from sim.geometry.ground_cover import grow_cover
+from sim.geometry.parts import Part
 from sim.geometry.rocks import scatter_rocks
 from sim.geometry.rubble import Box, make_heap
-from sim.geometry.surface import Mesh, box_mesh, join
+from sim.geometry.surface import BOX_TRIANGLES, Mesh, box_mesh, join
 from sim.geometry.terrain import HeightField, make_terrain
 from sim.scene import Scene, Terrain
 from sim.world.outdoor import add_cover, add_ground, add_rocks
-from sim.world.room import add_room, room_mesh
+from sim.world.room import add_room, room_mesh, room_parts
 
 # Mean linear reflectance of what bounces light.
 _CONCRETE = (0.32, 0.31, 0.29)
@@ -39,6 +40,7 @@ class World:
         spec: MuJoCo specification to add robots and cameras to, then compile. Frame `world`.
         vertices: (V, 3) float64, the true surface in `world` [m].
         triangles: (T, 3) int64 vertex indices, counter-clockwise seen from outside.
+        parts: What the triangles belong to, in their order.
         boxes: The settled boxes, if any.
         terrain: The height field of natural ground; None is a floor at z = 0.
     """
@@ -48,6 +50,7 @@ class World:
     spec: mujoco.MjSpec
     vertices: NDArray[np.float64]
     triangles: NDArray[np.int64]
+    parts: tuple[Part, ...]
     boxes: tuple[Box, ...]
     terrain: HeightField | None = None
 
@@ -56,6 +59,9 @@ class World:
         triangles = read_only(self.triangles, "triangles", (None, 3), np.int64)
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "triangles", triangles)
+        counted = sum(part.triangles for part in self.parts)
+        if counted != len(triangles):
+            raise ValueError(f"parts have {counted} triangles, the surface has {len(triangles)}")
 
     def floor_height(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.float64]:
         """Height of the bare ground below boxes and rocks [m]; NaN outside it."""
@@ -88,7 +94,8 @@ def build_world(scene: Scene, seed: int, pictures: bool = True) -> World:
     baker = _baker(scene, floor, box_meshes, _CONCRETE, _CARDBOARD) if pictures else None
     add_room(spec, scene.room, scene.texture, baker, picture_rng)
     _add_boxes(spec, scene, boxes, baker, picture_rng)
-    return World(scene, seed, spec, *surface, boxes)
+    box_parts = [Part(box.name, "box", len(BOX_TRIANGLES)) for box in boxes]
+    return World(scene, seed, spec, *surface, (*room_parts(scene.room), *box_parts), boxes)
 
 
 def _build_outdoor(
@@ -109,7 +116,13 @@ def _build_outdoor(
     add_ground(spec, ground, scene, baker, picture_rng)
     add_rocks(spec, rocks, scene.texture, baker, picture_rng)
     add_cover(spec, cover, scene.texture, baker, picture_rng)
-    return World(scene, seed, spec, *join([ground.mesh(), *things]), (), ground)
+    surface = join([ground.mesh(), *things])
+    parts = (
+        Part("ground", "ground", len(ground.mesh()[1])),
+        *(Part(rock.name, "rock", len(rock.mesh()[1])) for rock in rocks),
+        *cover.parts(),
+    )
+    return World(scene, seed, spec, *surface, parts, (), ground)
 
 
 def _baker(
