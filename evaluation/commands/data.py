@@ -109,10 +109,10 @@ class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
 
 @dataclass(frozen=True, kw_only=True)
 class Render(Verb):
-    """Add exact truth of every pixel to a recording: depth, normals, things, optical flow.
+    """Add exact truth of every pixel to a recording.
 
-    It follows from the stored motion and surface, without simulating again. docs/datasets.md has
-    the encodings.
+    That is depth, normals, segmentation and optical flow. It follows from the stored motion and
+    surface, without simulating again. docs/datasets.md has the encodings.
     """
 
     recording: Annotated[Positional[Path], Shown("RECORDING")]

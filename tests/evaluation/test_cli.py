@@ -107,7 +107,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("words", "named"),
     [
-        (["simulat"], "known: simulate, inspect, export, run"),
+        (["simulat"], "known: simulate, render, inspect, export, run"),
         (["simulate", "flat", "--out", "x", "--sensors", "good"], "'nominal'"),
         (["simulate", "flat", "--out", "x", "--seed", "a"], "--seed"),
         (["simulate", "flat", "--out", "x", "--sed", "1"], "--sed"),
