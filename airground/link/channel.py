@@ -1,4 +1,4 @@
-"""A one-way channel over a loopback socket whose sender never blocks.
+"""A one-way channel over a socket of this user alone, whose sender never blocks.
 
 The receiver acknowledges each processed message. The sender can so drop messages instead of
 filling the memory. If one side dies, the other one only receives nothing more."""
@@ -6,10 +6,12 @@ filling the memory. If one side dies, the other one only receives nothing more."
 from __future__ import annotations
 
 import contextlib
+import tempfile
 
 import zmq
 
-LOOPBACK = "tcp://127.0.0.1"
+SOCKET = "link"
+"""File name of the socket."""
 LINGER_MS = 5000
 """Longest time that the last messages may take to leave a closing channel [ms]."""
 
@@ -50,13 +52,19 @@ class Sender:
 
 
 class Receiver:
-    """The end that receives; bound to a free port of the loopback interface, at `address`."""
+    """The end that receives; bound to a socket in a folder that only this user may enter.
+
+    Attributes:
+        address: Address for the sender.
+    """
 
     def __init__(self) -> None:
         self._socket: zmq.Socket[bytes] = zmq.Context.instance().socket(zmq.DEALER)
         self._socket.set_hwm(0)
         self._socket.setsockopt(zmq.LINGER, 0)
-        self.address = f"{LOOPBACK}:{self._socket.bind_to_random_port(LOOPBACK)}"
+        self._folder = _private_folder()
+        self.address = f"ipc://{self._folder.name}/{SOCKET}"
+        self._socket.bind(self.address)
 
     def wait(self, timeout_s: float) -> bool:
         """Wait until a message is there; False where none came in time."""
@@ -74,4 +82,15 @@ class Receiver:
             self._socket.send(b"", zmq.NOBLOCK)
 
     def close(self) -> None:
+        """Close the socket and remove its folder."""
         self._socket.close()
+        self._folder.cleanup()
+
+
+def _private_folder() -> tempfile.TemporaryDirectory[str]:
+    """A new folder of mode 0700, whose name is short enough for the name of a socket."""
+    folder = tempfile.TemporaryDirectory(prefix="airground-")
+    if len(f"{folder.name}/{SOCKET}".encode()) <= zmq.IPC_PATH_MAX_LEN:
+        return folder
+    folder.cleanup()
+    return tempfile.TemporaryDirectory(prefix="airground-", dir="/tmp")

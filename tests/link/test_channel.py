@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import stat
+import tempfile
+from pathlib import Path
+
 import pytest
 
 from airground.link.channel import Receiver, Sender
@@ -12,9 +16,27 @@ def receiver() -> Receiver:
     return Receiver()
 
 
-def test_it_listens_to_this_machine_only(receiver: Receiver) -> None:
-    assert receiver.address.startswith("tcp://127.0.0.1:")
+def test_only_this_user_reaches_it(receiver: Receiver) -> None:
+    folder = Path(receiver.address.removeprefix("ipc://")).parent
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
     receiver.close()
+    assert not folder.exists()
+
+
+def test_a_long_folder_of_temporary_files_does_no_harm(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    long = tmp_path / ("long" * 30)
+    long.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(long))
+    receiver = Receiver()
+    sender = Sender(receiver.address, capacity=1)
+    sender.send([b"here"])
+    assert receiver.wait(5)
+    assert receiver.receive() == [b"here"]
+    sender.close()
+    receiver.close()
+    assert list(long.iterdir()) == []
 
 
 def test_a_full_channel_has_no_room_until_something_is_acknowledged(receiver: Receiver) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import struct
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 
 from airground.core.cloud import Source
 from airground.core.trajectory import Trajectory
+from airground.errors import InputError
 from airground.link.channel import Receiver
 from airground.link.frame_codec import Parts, unpack, unpack_trajectory
 from airground.tracking import HandOver, TrackedFrame
@@ -31,6 +33,7 @@ class Stream:
     Attributes:
         final: Final trajectory of the robot; None before it arrived.
         late_ns: Stamps of frames that arrived after a newer frame was taken [ns].
+        malformed: Number of messages that were none of a robot's, and were dropped.
     """
 
     def __init__(self, receiver: Receiver, is_alive: Callable[[], bool]) -> None:
@@ -40,17 +43,23 @@ class Stream:
         self._ended = False
         self.final: Trajectory | None = None
         self.late_ns: list[int] = []
+        self.malformed = 0
 
     def read(self) -> None:
         """Read all messages that the channel holds."""
         alive = self._is_alive()  # before reading, so that a process's last messages are read
         while (message := self._receiver.receive()) is not None:
-            envelope, parts = Envelope.of(message), message[1:]
-            if envelope.last:
-                self.final, self._ended = unpack_trajectory(parts), True
-            else:
-                self._waiting.append((envelope, parts))
+            try:
+                self._sort_in(Envelope.of(message), message[1:])
+            except (InputError, struct.error, IndexError):
+                self.malformed += 1
         self._ended |= not alive
+
+    def _sort_in(self, envelope: Envelope, parts: Parts) -> None:
+        if envelope.last:
+            self.final, self._ended = unpack_trajectory(parts), True
+        else:
+            self._waiting.append((envelope, parts))
 
     def stamp_ns(self, now_ns: int) -> int | None:
         """Stamp of the next frame [ns]; None until it has crossed the radio."""
@@ -63,10 +72,14 @@ class Stream:
         return self._ended and not self._waiting
 
     def take(self, newest: tuple[int, Source]) -> TrackedFrame | None:
-        """The next frame; None if it is older than the newest frame taken."""
+        """The next frame; None if it is malformed, or older than the newest frame taken."""
         _, parts = self._waiting.popleft()
         self._receiver.acknowledge()
-        frame = unpack(parts)
+        try:
+            frame = unpack(parts)
+        except InputError:
+            self.malformed += 1
+            return None
         if (frame.stamp_ns, frame.robot) < newest:
             self.late_ns.append(frame.stamp_ns)
             self._hand_over.leave_out(frame)

@@ -1,11 +1,12 @@
 """A live run: two trackers in processes of their own, the mapper in this one.
 
-Each robot tracks in its process and sends its frames over a loopback socket. The mapper takes
-them in order of time. No tracker waits for the mapper.
+Each robot tracks in its process and sends its frames over a socket of this user alone. The mapper
+takes them in order of time. No tracker waits for the mapper.
 """
 
 from __future__ import annotations
 
+import logging
 import os
 import time
 from collections.abc import Iterator, Mapping
@@ -41,6 +42,8 @@ MAPPER_NICENESS = 5
 
 REPORT_S = 30.0
 """Longest wait for a robot's report after its last frame [s]."""
+
+logger = logging.getLogger(__name__)
 
 
 @dataclass
@@ -194,7 +197,9 @@ class LiveTracking(AbstractContextManager["LiveTracking"]):
             report = _report_of(process)
             log.reports[robot] = report
             log.late_ns[robot] = self._streams[robot].late_ns
-            name = robot.name.lower()
+            name, malformed = robot.name.lower(), self._streams[robot].malformed
+            if malformed:
+                logger.warning("%s: %d messages were malformed and were dropped", name, malformed)
             answers, final = (report.log, report.final) if report else (FrontEndLog(), None)
             tracked[name] = Tracked(name, answers, final, name in self._setup.slam_robots())
         return TrackingReport(tracked, self._streams[Source.GROUND].final)

@@ -111,3 +111,21 @@ def test_a_frame_is_ready_after_crossing_the_radio(
         one.end()
     assert list(frames) == []
     assert robots[Source.MAV].stream.late_ns == [10]
+
+
+def test_malformed_messages_are_counted_and_dropped(robots: dict[Source, ScriptedRobot]) -> None:
+    mav = robots[Source.MAV]
+    for parts in (
+        [b"xy"],
+        Envelope(True, 5, 5).around([b"{", b""]),
+        Envelope(False, 15, 0).around([b"no frame"]),
+    ):
+        mav.sender.send(parts)
+        assert mav.receiver.wait(5)
+        mav.stream.read()
+    mav.send(mav_frame(20))
+    for one in robots.values():
+        one.end()
+    assert list(taken(robots, SteppedClock())) == [("MAV", 20)]
+    assert mav.stream.malformed == 3
+    assert mav.stream.final is not None
