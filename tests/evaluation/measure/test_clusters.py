@@ -85,7 +85,10 @@ def test_unfit_workers_are_refused(
 
 @pytest.mark.parametrize(
     ("cluster", "message"),
-    [("somewhere", "expected tcp://HOST:PORT"), ("tcp://127.0.0.1:1", "no Dask scheduler answers")],
+    [
+        ("somewhere", "expected tls://HOST:PORT, tcp://HOST:PORT"),
+        ("tcp://127.0.0.1:1", "no Dask scheduler answers"),
+    ],
 )
 def test_a_missing_cluster_is_an_error(
     cluster: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
