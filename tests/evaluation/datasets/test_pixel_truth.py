@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
+from airground.core.se3 import SE3
 from airground.errors import InputError, RecordingError
 from evaluation.cli import answer
 from evaluation.datasets.pixel_truth_files import (
@@ -21,6 +22,7 @@ from evaluation.datasets.pixel_truth_files import (
 from evaluation.datasets.simulated import Simulated
 from sim.geometry.parts import KINDS, Instances, Part, read_parts, write_parts
 from sim.recording.pixel_truth import PixelTruth, flow, instance_ids, instances_of, pixel_truth
+from sim.recording.truth import Truth
 from sim.robots.motion import ROBOTS, Robot
 
 ALL = "depth,normals,segmentation,flow"
@@ -56,6 +58,17 @@ def test_normals_are_those_of_the_depth(simulated: Simulated, robot: Robot) -> N
     agreement = np.einsum("ijk,ijk->ij", from_depth, seen.normals[1:-1, 1:-1])
     assert same.mean() > 0.2
     assert agreement[same].min() > np.cos(np.radians(1.0))
+
+
+def test_normals_face_a_camera_behind_a_surface_too(
+    simulated: Simulated, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    below = SE3(np.eye(3), np.array([0.0, 0.0, -1.0]))  # looks up at the floor's back
+    monkeypatch.setattr(Truth, "T_world_camera", lambda *_: below)
+    seen = seen_by(simulated, "mav")
+    floor = seen.normals[np.isfinite(seen.depth)]
+    np.testing.assert_allclose(floor, np.tile([0.0, 0.0, -1.0], (len(floor), 1)), atol=1e-6)
+    assert len(floor) > 100_000
 
 
 def test_things_are_where_the_list_of_boxes_says(simulated: Simulated) -> None:
