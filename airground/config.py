@@ -214,12 +214,21 @@ class Localization(Section):
 
 
 class Refinement(Section):
-    """Point-to-plane ICP and what it needs to converge (Sec. VII)."""
+    """Point-to-plane ICP and what it needs to converge (Sec. VII). On wide and on sparse maps all
+    lengths are multiplied by one factor (`extent_m`, `spacing_m`)."""
 
+    extent_m: Positive = 10.0
+    """Extent of the aerial surface up to which lengths hold as given; beyond, they grow with it
+    [m]."""
+    spacing_m: Positive = 0.06
+    """Median distance of neighbouring points, after `voxel_m`, up to which lengths hold as given;
+    beyond, they grow with it [m]."""
     local_search: bool = True
     """Whether the height maps around the start are searched before ICP."""
     local_search_radius_m: Positive = 0.6
     """Half the side of that search [m]."""
+    local_search_angle_deg: Annotated[float, Field(ge=0, le=180)] = 8.0
+    """Largest turn of that search to either side, in steps of 2 deg [deg]."""
     local_search_cells_per_m: Positive = 25.0
     """Resolution of that search [cells/m]."""
     level_prior: bool = True
