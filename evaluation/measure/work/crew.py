@@ -18,6 +18,7 @@ from typing import Any, Self, TypeVar
 import dask
 from distributed import Client, KilledWorker, LocalCluster, Worker, WorkerPlugin, as_completed
 from distributed.comm import CommClosedError
+from distributed.security import Security
 
 from airground.errors import AirgroundError, InputError
 from evaluation.measure.work.batch_system import NO_DASHBOARD, batch_cluster
@@ -43,12 +44,15 @@ SETTINGS = {
 }
 
 
+logger = logging.getLogger(__name__)
+
+
 class Crew:
     """Workers that start with the first task and end with the block.
 
     Args:
-        cluster: None for processes on this machine; `tcp://HOST:PORT` of a running Dask
-            scheduler; or a YAML file that describes jobs of a batch system.
+        cluster: None for processes on this machine; `tls://HOST:PORT` or `tcp://HOST:PORT` of a
+            running Dask scheduler; or a YAML file that describes jobs of a batch system.
         cores: Cores of this machine for all workers; a worker of a cluster uses one.
         tasks: Largest number of tasks at a time, and so of processes here.
         scratch: Folder for temporary files of the workers on this machine.
@@ -130,11 +134,15 @@ class Crew:
         return client
 
     def _local(self) -> LocalCluster:
+        # Whoever reaches a port of Dask runs code as this user, and other users of the machine
+        # reach the loopback interface: only holders of this run's own key may connect.
         cluster = LocalCluster(
             n_workers=self._workers,
             threads_per_worker=1,
             processes=True,
             host="127.0.0.1",
+            protocol="tls",
+            security=Security.temporary(),
             scheduler_kwargs=NO_DASHBOARD,
             memory_limit=0,
             silence_logs=logging.CRITICAL,
@@ -147,10 +155,18 @@ def _joined(where: str, stack: ExitStack) -> Client:
     if where.endswith((".yaml", ".yml")):
         return Client(stack.enter_context(batch_cluster(Path(where))), set_as_default=False)
     if "://" not in where:
-        raise InputError(f"--cluster {where}: expected tcp://HOST:PORT or a .yaml file")
+        raise InputError(
+            f"--cluster {where}: expected tls://HOST:PORT, tcp://HOST:PORT or a .yaml file"
+        )
+    if where.startswith("tcp://"):
+        logger.warning(
+            "--cluster %s: not encrypted; whoever reaches a port of this cluster runs code as you "
+            "(docs/sweep.md has tls://)",
+            where,
+        )
     try:
         return Client(where, timeout=CONNECT_S, set_as_default=False)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, TypeError) as error:
         raise InputError(f"--cluster {where}: no Dask scheduler answers there ({error})") from None
 
 
