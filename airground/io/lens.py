@@ -22,6 +22,10 @@ MAX_HALF_ANGLE = np.deg2rad(60.0)
 image is stretched by 1 / cos^2 of the angle: by 4 here, without limit towards 90 degrees."""
 FOCAL_STEPS = 40
 """Bisections for the focal length: they find it to a billionth."""
+FOLD_STEPS = 2000
+"""Angles at which a lens is held against folding: steps of a twentieth of a degree."""
+MAX_FOLD_ANGLE = np.deg2rad(85.0)
+"""Widest angle for which a radial-tangential model is used [rad]."""
 MAX_ZOOM = 4.0
 """Largest focal length that is tried, over the lens's own: the principal point is never so far
 off the centre that an image needs more."""
@@ -54,6 +58,25 @@ class Lens:
     def bends(self) -> bool:
         """Whether images differ from a pinhole camera's."""
         return self.model == "equidistant" or any(self.distortion)
+
+    def folds(self) -> bool:
+        """Whether the image turns back toward its middle before it reaches its nearest side, so
+        that two directions share a pixel."""
+        fx, fy, cx, cy = self.intrinsics
+        nearest = min(cx / fx, cy / fy, (self.width - 1 - cx) / fx, (self.height - 1 - cy) / fy)
+        k = np.array([*self.distortion, *np.zeros(8)])
+        # The angle for a fisheye, else its tangent; tangential terms are small beside these.
+        if self.model == "equidistant":
+            radii = np.linspace(0, np.pi, FOLD_STEPS)
+            bent = radii * np.polyval([*k[3::-1], 1.0], radii**2)
+        else:
+            radii = np.tan(np.linspace(0, MAX_FOLD_ANGLE, FOLD_STEPS))
+            squares = radii**2
+            bent = radii * np.polyval([k[4], k[1], k[0], 1.0], squares)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                bent /= np.polyval([k[7], k[6], k[5], 1.0], squares)
+        turns = np.flatnonzero(~(np.diff(bent) > 0))
+        return len(turns) > 0 and not bent[turns[0]] >= nearest
 
 
 class Undistortion:

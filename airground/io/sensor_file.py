@@ -46,6 +46,10 @@ DEPTH_UNITS, RATE = "depth_units_per_m", "rate_hz"
 """Keys of a calibration for the value of one metre of depth, and for folders without stamps."""
 
 
+_OF_WRONG_VALUES = (ValueError, LookupError, AttributeError, TypeError, OverflowError)
+"""What PyYAML raises where a tag and its value do not fit, as in `!!bool maybe`."""
+
+
 class _PlainLoader(yaml.SafeLoader):  # type: ignore[misc]  # yaml has no types
     """Numbers, text, lists and tables; aliases, of which few can mean millions, are refused."""
 
@@ -54,6 +58,15 @@ class _PlainLoader(yaml.SafeLoader):  # type: ignore[misc]  # yaml has no types
             mark = self.peek_event().start_mark
             raise yaml.YAMLError(f"aliases are not read (line {mark.line + 1})")
         return super().compose_node(parent, index)
+
+    def construct_object(self, node: yaml.Node, deep: bool = False) -> Any:
+        try:
+            return super().construct_object(node, deep)
+        except _OF_WRONG_VALUES:
+            kind = node.tag.rpartition(":")[2]
+            raise yaml.YAMLError(
+                f"{shortened(node.value)} is no {kind} (line {node.start_mark.line + 1})"
+            ) from None
 
 
 def read_mapping(path: Path) -> dict[str, Any]:
@@ -133,7 +146,13 @@ def checked_lens(
             f"{path}: key 'distortion_coefficients': expected {wanted} numbers for "
             f"{model}, got {len(coefficients)}"
         )
-    return Lens(width, height, (fx, fy, cx, cy), coefficients, kind)
+    lens = Lens(width, height, (fx, fy, cx, cy), coefficients, kind)
+    if lens.folds():
+        raise RecordingError(
+            f"{path}: key 'distortion_coefficients': with {list(coefficients)} the image folds "
+            f"back within its {width}x{height} pixels; are model and order of the numbers right?"
+        )
+    return lens
 
 
 def read_positive(path: Path, key: str) -> float | None:
@@ -201,6 +220,6 @@ def _as_numbers(values: object) -> tuple[float, ...] | None:
         return None
     try:
         numbers = tuple(float(value) for value in values)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return None
     return numbers if all(map(math.isfinite, numbers)) else None

@@ -114,6 +114,10 @@ YAML = {
     "several documents": ("a: 1\n---\nb: 2", "cannot be read"),
     "impossible date": ("a: 2021-99-99", "cannot be read"),
     "zero bytes": ("a: \0", "cannot be read"),
+    "no integer": ('a: 1\nb: !!int ""', r"'' is no int \(line 2\)"),
+    "no truth value": ("a: !!bool maybe", r"'maybe' is no bool \(line 1\)"),
+    "no time": ("a: !!timestamp noon", r"'noon' is no timestamp \(line 1\)"),
+    "no number": ("a: [!!float x]", r"'x' is no float \(line 1\)"),
 }
 
 

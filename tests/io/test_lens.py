@@ -111,6 +111,8 @@ BAD = {
     "model": ("omni", "[0, 0, 0, 0]", "'omni' is unknown; known: radial-tangential, radtan,"),
     "a list": ("[1]", "[0, 0, 0, 0]", "'distortion_model': '.1.' is unknown"),
     "words": ("radtan", "[a, b, c, d]", "expected a list of numbers"),
+    "a fold": ("radtan", "[-1.0, 0, 0, 0]", "'distortion_coefficients': .* folds back within"),
+    "a fisheye's fold": ("fisheye", "[-1.0, 0, 0, 0]", "folds back within its 320x240"),
 }
 
 
@@ -132,3 +134,22 @@ def test_icls_negative_focal_length_is_explained(tmp_path: Path) -> None:
     )
     with pytest.raises(RecordingError, match=message):
         read_lens(file)
+
+
+# Coefficients that calibrations of real cameras have, strongest first.
+REAL = {
+    "TUM freiburg1": (640, 480, (517.3, 516.5, 318.6, 255.3), (0.26, -0.95, -0.005, 0.003, 1.16)),
+    "EuRoC": (752, 480, (458.7, 457.3, 367.2, 248.4), (-0.28, 0.074, 0.0002, 0.00002)),
+    "action camera": (1920, 1080, (880.0, 880.0, 960.0, 540.0), (-0.27, 0.1, 0.0, 0.0, -0.019)),
+}
+
+
+@pytest.mark.parametrize("name", REAL)
+def test_real_lenses_do_not_fold(name: str) -> None:
+    width, height, intrinsics, distortion = REAL[name]
+    assert not Lens(width, height, intrinsics, distortion).folds()
+
+
+@pytest.mark.parametrize("name", LENSES)
+def test_lenses_that_can_be_undone_do_not_fold(name: str) -> None:
+    assert not LENSES[name].folds()
