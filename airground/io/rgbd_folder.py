@@ -110,6 +110,7 @@ class RgbdFolder:
                 T_imu_camera,
                 level_body(inertial.up_imu if inertial else up_camera, T_imu_camera),
                 inertial.noise if inertial else None,
+                readout_s=undistortion.readout_s,
             ),
             camera_stamps=self.stamps_ns,
             imu=inertial.samples if inertial else None,

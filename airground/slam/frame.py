@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from airground.core.arrays import F32, U8
 from airground.errors import InputError
+from airground.slam.rolling_shutter import GLOBAL, Shutter
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,11 +16,13 @@ class Frame:
     Attributes:
         image: (height, width) grey image.
         depth: (height, width) depth [m], NaN where missing; None without a depth camera.
+        shutter: How the camera turned while the rows were taken, as far as it is known.
     """
 
     stamp_ns: int
     image: U8
     depth: F32 | None = None
+    shutter: Shutter = GLOBAL
 
 
 def require_order(stamp_ns: int, last_ns: int | None) -> None:

@@ -33,6 +33,7 @@ from airground.slam.map_adjustment import MapAdjuster
 from airground.slam.motion_model import MotionModel, Prediction
 from airground.slam.recovery import Recovery
 from airground.slam.rig_state import RigState
+from airground.slam.rolling_shutter import Shutter
 from airground.slam.sparse_map import SparseMap
 from airground.slam.starts import REST_WINDOW_NS, MovingStart
 from airground.slam.tracked_path import TrackedPath
@@ -143,7 +144,7 @@ class KeyframeSlam:
         followed = len(self.tracker.ids)
         self.tracker.advance(frame.image, expected, 2 if lost else 0)
         cut = len(self.tracker.ids) < self.parameters.min_points <= followed
-        fit = self._fit(frame, prediction)
+        frame, fit = self._fit(frame, prediction)
         if fit is None and self._doubt is not None:
             self._go_back(self._doubt, frame)
             prediction = self._predict(frame, turn)
@@ -158,6 +159,8 @@ class KeyframeSlam:
         timed = self.metric and self.calibration.imu is not None
         if self._choice.wanted(self.tracker, self.state, frame.stamp_ns, timed):
             before = self.T_map_camera()
+            if self.calibration.imu is None:
+                self.path.lead(frame.stamp_ns, self.state.pose(), self.map.keyframes)
             adjusted = self._insert(frame)
             self.moved_from = before if adjusted else None
             return fit, adjusted
@@ -246,31 +249,45 @@ class KeyframeSlam:
 
     def _predict(self, frame: Frame, turn: F64) -> Prediction:
         assert self.stamp_ns is not None
-        return self.motion.predict(self.state, turn, self.stamp_ns, frame.stamp_ns, self.inertial)
+        followed = self.metric and self._seen_ns == self.stamp_ns
+        stamps = self.stamp_ns, frame.stamp_ns
+        return self.motion.predict(self.state, turn, *stamps, self.inertial, followed)
 
-    def _fit(self, frame: Frame, prediction: Prediction) -> PoseFit | None:
-        """The pose by the map points that were followed into this image."""
+    def _fit(self, frame: Frame, prediction: Prediction) -> tuple[Frame, PoseFit | None]:
+        """The image with its shutter, and the pose by the map points that were followed into it."""
         rows = np.flatnonzero(self.map.mapped(self.tracker.ids))
         ids = self.tracker.ids[rows]
         pixels = self.tracker.pixels[rows].astype(np.float64)
         expected = prediction.state.pose() @ self.T_rig_camera
+        frame = replace(frame, shutter=self._shutter(frame, expected))
         fit = frame_pose(
             self.map.positions[ids],
-            pixels,
+            frame.shutter.straight(pixels),
             self.camera,
             expected,
             sigma_px=self.parameters.corner_sigma_px,
             rotation_sigma=prediction.rotation_sigma,
-            inertial=prediction.inertial,
+            position_sigma=prediction.position_sigma,
             min_points=self.parameters.min_points,
             rng=self._rng,
             inverse_depths=inverse_depths_at(frame.depth, pixels, self._max_depth_m),
             inverse_depth_sigma=self._inverse_depth_sigma,
         )
         if fit is None or (self.metric and jumps(fit.T_map_camera, expected)):
-            return None
+            return frame, None
         self.tracker.judge(ids, fit.inliers, PATIENCE)
-        return fit
+        return frame, fit
+
+    def _shutter(self, frame: Frame, T_map_camera: SE3) -> Shutter:
+        """How the camera turned within an image at an expected pose.
+
+        The turn between whole images is free of the rows' times if it is even. That of the fitted
+        pose is not: straightened by it, images pull the turns of the next ones to and fro.
+        """
+        assert self.stamp_ns is not None
+        turn = self.T_map_camera().rotation.T @ T_map_camera.rotation
+        seconds = (frame.stamp_ns - self.stamp_ns) * 1e-9
+        return Shutter.turning(self.camera, self.calibration.readout_s, turn, seconds)
 
     def _recover(self, frame: Frame, prediction: Prediction) -> PoseFit | None:
         """Look for the map where it should be, then anywhere."""
@@ -278,8 +295,9 @@ class KeyframeSlam:
             return None
         assert self.stamp_ns is not None
         expected = prediction.state.pose() @ self.T_rig_camera
-        found = self._recovery.near(frame.image, expected, prediction.rotation_sigma is not None)
-        found = found or self._recovery.anywhere(frame.image)
+        turn_known = prediction.rotation_sigma is not None
+        found = self._recovery.near(frame.image, expected, turn_known, shutter=frame.shutter)
+        found = found or self._recovery.anywhere(frame.image, frame.shutter)
         if found is None:
             return None
         if surprising(found.fit.T_map_camera, expected, (frame.stamp_ns - self._seen_ns) * 1e-9):

@@ -67,7 +67,16 @@ class LocalMapper:
         """
         ids, pixels = self.tracker.ids.copy(), self.tracker.pixels.astype(np.float64)
         depths = inverse_depths_at(frame.depth, pixels, self.max_depth_m)
-        keyframe = Keyframe(frame.stamp_ns, frame.image, state, ids, pixels, depths, still)
+        keyframe = Keyframe(
+            frame.stamp_ns,
+            frame.image,
+            state,
+            ids,
+            frame.shutter.straight(pixels),
+            depths,
+            still,
+            shutter=frame.shutter,
+        )
         self.map.keyframes.append(keyframe)
         index = len(self.map.keyframes) - 1
         if motion is not None:
@@ -122,7 +131,7 @@ class LocalMapper:
             chosen,
             ids,
             keyframe.image,
-            expected,
+            keyframe.shutter.in_image(expected),
             self.parameters.patch_px,
             levels=1,
             search_px=REUSE_SEARCH_PX,
@@ -133,9 +142,10 @@ class LocalMapper:
         """Follow old points again if they agree with each other on where the camera is."""
         if len(ids) < MIN_REUSED:
             return False
+        straight = keyframe.shutter.straight(pixels)
         fit = estimate_pose(
             self.map.positions[ids],
-            pixels.astype(np.float64),
+            straight,
             np.full(len(ids), self.parameters.corner_sigma_px),
             self.camera,
             keyframe.state.pose() @ self.T_rig_camera,
@@ -146,9 +156,8 @@ class LocalMapper:
         if good.sum() < MIN_REUSED or good.mean() < 0.5:
             return False
         self.tracker.add(ids[good], pixels[good])
-        pixels_kept = pixels[good].astype(np.float64)
-        depths = inverse_depths_at(depth, pixels_kept, self.max_depth_m)
-        keyframe.see(ids[good], pixels_kept, depths)
+        depths = inverse_depths_at(depth, pixels[good].astype(np.float64), self.max_depth_m)
+        keyframe.see(ids[good], straight[good], depths)
         return True
 
     def _detect(self, keyframe: Keyframe, index: int, depth: F32 | None) -> None:
@@ -161,9 +170,9 @@ class LocalMapper:
             self.parameters.corner_spacing_px,
             None if depth is None else depth <= self.max_depth_m,
         )
-        pixels = corners.astype(np.float64)
+        pixels = keyframe.shutter.straight(corners)
         ids = self.map.new_points(pixels, index)
-        inverse_depths = inverse_depths_at(depth, pixels, self.max_depth_m)
+        inverse_depths = inverse_depths_at(depth, corners.astype(np.float64), self.max_depth_m)
         keyframe.see(ids, pixels, inverse_depths)
         self.tracker.add(ids, corners)
         known = np.isfinite(inverse_depths)
