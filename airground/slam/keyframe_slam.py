@@ -33,7 +33,6 @@ from airground.slam.map_adjustment import MapAdjuster
 from airground.slam.motion_model import MotionModel, Prediction
 from airground.slam.recovery import Recovery
 from airground.slam.rig_state import RigState
-from airground.slam.rolling_shutter import Shutter
 from airground.slam.sparse_map import SparseMap
 from airground.slam.starts import REST_WINDOW_NS, MovingStart
 from airground.slam.tracked_path import TrackedPath
@@ -118,33 +117,31 @@ class KeyframeSlam:
 
     def begin_moving(self, start: MovingStart) -> None:
         """Start the map with two views; its unit is the first one's median depth."""
-        self.tracker.restart(start.first.image)
         ids = self.map.new_points(start.pixels_first, 0)
         self.map.place(ids, start.points_map)
-        self.tracker.add(ids, start.pixels_first)
-        self.state, self.stamp_ns = start.first_state, start.first.stamp_ns
-        self._insert(start.first)
-        self.tracker.restart(start.second.image)
-        self.tracker.add(ids, start.pixels_second)
-        self.state, self.stamp_ns = start.second_state, start.second.stamp_ns
-        self._seen_ns = start.second.stamp_ns
-        self._insert(start.second)
+        for frame, state, pixels in start.views():
+            self.tracker.restart(frame.image)
+            self.tracker.add(ids, pixels)
+            self.state, self.stamp_ns, self._seen_ns = state, frame.stamp_ns, frame.stamp_ns
+            self._insert(frame)
 
     def track(self, frame: Frame) -> tuple[PoseFit | None, bool]:
         """Follow the map into the next image.
         Returns the fit of the newest pose, None where the image gave none, and whether the map was
         adjusted as a whole."""
+        assert self.stamp_ns is not None
         turn, self.moved_from = self._turn, None
         if self._image_turn is not None:
             turn = self._image_turn.rig_turn(frame.image, turn, self.T_rig_camera.rotation)
         prediction = self._predict(frame, turn)
         lost = self._seen_ns != self.stamp_ns
         there = prediction.state.pose() @ self.T_rig_camera
+        frame = frame.turning(self.calibration, self.T_map_camera(), there, self.stamp_ns)
         expected = expected_pixels(self.map, self.tracker, self.camera, self.T_map_camera(), there)
         followed = len(self.tracker.ids)
         self.tracker.advance(frame.image, expected, 2 if lost else 0)
         cut = len(self.tracker.ids) < self.parameters.min_points <= followed
-        frame, fit = self._fit(frame, prediction)
+        fit = self._fit(frame, prediction)
         if fit is None and self._doubt is not None:
             self._go_back(self._doubt, frame)
             prediction = self._predict(frame, turn)
@@ -249,17 +246,15 @@ class KeyframeSlam:
 
     def _predict(self, frame: Frame, turn: F64) -> Prediction:
         assert self.stamp_ns is not None
-        followed = self.metric and self._seen_ns == self.stamp_ns
-        stamps = self.stamp_ns, frame.stamp_ns
-        return self.motion.predict(self.state, turn, *stamps, self.inertial, followed)
+        known = self.inertial, self.metric and self._seen_ns == self.stamp_ns
+        return self.motion.predict(self.state, turn, self.stamp_ns, frame.stamp_ns, *known)
 
-    def _fit(self, frame: Frame, prediction: Prediction) -> tuple[Frame, PoseFit | None]:
-        """The image with its shutter, and the pose by the map points that were followed into it."""
+    def _fit(self, frame: Frame, prediction: Prediction) -> PoseFit | None:
+        """The pose by the map points that were followed into this image."""
         rows = np.flatnonzero(self.map.mapped(self.tracker.ids))
         ids = self.tracker.ids[rows]
         pixels = self.tracker.pixels[rows].astype(np.float64)
         expected = prediction.state.pose() @ self.T_rig_camera
-        frame = replace(frame, shutter=self._shutter(frame, expected))
         fit = frame_pose(
             self.map.positions[ids],
             frame.shutter.straight(pixels),
@@ -274,20 +269,9 @@ class KeyframeSlam:
             inverse_depth_sigma=self._inverse_depth_sigma,
         )
         if fit is None or (self.metric and jumps(fit.T_map_camera, expected)):
-            return frame, None
+            return None
         self.tracker.judge(ids, fit.inliers, PATIENCE)
-        return frame, fit
-
-    def _shutter(self, frame: Frame, T_map_camera: SE3) -> Shutter:
-        """How the camera turned within an image at an expected pose.
-
-        The turn between whole images is free of the rows' times if it is even. That of the fitted
-        pose is not: straightened by it, images pull the turns of the next ones to and fro.
-        """
-        assert self.stamp_ns is not None
-        turn = self.T_map_camera().rotation.T @ T_map_camera.rotation
-        seconds = (frame.stamp_ns - self.stamp_ns) * 1e-9
-        return Shutter.turning(self.camera, self.calibration.readout_s, turn, seconds)
+        return fit
 
     def _recover(self, frame: Frame, prediction: Prediction) -> PoseFit | None:
         """Look for the map where it should be, then anywhere."""
@@ -295,9 +279,7 @@ class KeyframeSlam:
             return None
         assert self.stamp_ns is not None
         expected = prediction.state.pose() @ self.T_rig_camera
-        turn_known = prediction.rotation_sigma is not None
-        found = self._recovery.near(frame.image, expected, turn_known, shutter=frame.shutter)
-        found = found or self._recovery.anywhere(frame.image, frame.shutter)
+        found = self._recovery.find(frame, expected, prediction.rotation_sigma is not None)
         if found is None:
             return None
         if surprising(found.fit.T_map_camera, expected, (frame.stamp_ns - self._seen_ns) * 1e-9):

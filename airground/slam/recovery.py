@@ -11,6 +11,7 @@ from airground.config import KeyframeSlam
 from airground.core.arrays import F32, F64, I64, U8
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
+from airground.slam.frame import Frame
 from airground.slam.geometry.pose_estimation import PoseFit, estimate_pose
 from airground.slam.geometry.relocalization import KeyframeIndex
 from airground.slam.reacquisition import find_in_keyframes, keyframes_in_view, visible
@@ -95,6 +96,11 @@ class Recovery:
         )
         rotation_sigma = TURN_SIGMA if turn_known else None
         return self._agreed(again, found, shutter, T_map_camera, least, rotation_sigma)
+
+    def find(self, frame: Frame, T_map_camera: SE3, turn_known: bool) -> Found | None:
+        """Look where the map should be, then anywhere."""
+        there = self.near(frame.image, T_map_camera, turn_known, shutter=frame.shutter)
+        return there or self.anywhere(frame.image, frame.shutter)
 
     def anywhere(self, image: U8, shutter: Shutter = GLOBAL) -> Found | None:
         """Compare the image with all keyframes."""

@@ -129,6 +129,13 @@ class MovingStart:
     pixels_second: F64
     points_map: F64
 
+    def views(self) -> tuple[tuple[Frame, RigState, F64], ...]:
+        """Image, state and pixels of both."""
+        return (
+            (self.first, self.first_state, self.pixels_first),
+            (self.second, self.second_state, self.pixels_second),
+        )
+
     def biased(self, known: RigState) -> MovingStart:
         """The same start with the biases of another state."""
         biases = {
