@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import tomllib
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -45,10 +44,6 @@ NOISE_KEYS = tuple(
 )
 DEPTH_UNITS, RATE = "depth_units_per_m", "rate_hz"
 """Keys of a calibration for the value of one metre of depth, and for folders without stamps."""
-READOUT = "readout_s"
-"""Key of a camera that takes its rows one after the other."""
-MAX_READOUT_S = 0.1
-"""Rolling shutters take up to about 50 ms; a larger number is one of milliseconds."""
 
 
 _OF_WRONG_VALUES = (ValueError, LookupError, AttributeError, TypeError, OverflowError)
@@ -97,9 +92,7 @@ def read_mapping(path: Path) -> dict[str, Any]:
 
 
 def read_lens(path: Path) -> Lens:
-    """Read `resolution`, `intrinsics`, `distortion_model`, `distortion_coefficients` and, where it
-    is stated, `readout_s`.
-
+    """Read `resolution`, `intrinsics`, `distortion_model` and `distortion_coefficients`.
     RecordingError names the file, the key and what would be right."""
     values = read_mapping(path)
     model = values.get("camera_model", "pinhole")
@@ -111,8 +104,7 @@ def read_lens(path: Path) -> Lens:
     width, height = (round(v) for v in _numbers(values, "resolution", (2,), path))
     intrinsics = _numbers(values, "intrinsics", (4,), path)
     bent, coefficients = _distortion(values, path)
-    lens = checked_lens(width, height, intrinsics, bent, coefficients, path)
-    return replace(lens, readout_s=_readout(values, path))
+    return checked_lens(width, height, intrinsics, bent, coefficients, path)
 
 
 def checked_lens(
@@ -161,18 +153,6 @@ def checked_lens(
             f"back within its {width}x{height} pixels; are model and order of the numbers right?"
         )
     return lens
-
-
-def _readout(values: dict[str, Any], path: Path) -> float:
-    if READOUT not in values:
-        return 0.0
-    seconds = _positive(values[READOUT], READOUT, path)
-    if seconds > MAX_READOUT_S:
-        raise RecordingError(
-            f"{path}: key '{READOUT}': {seconds:g} s is longer than {MAX_READOUT_S:g} s; expected "
-            "seconds from the first to the last row of an image"
-        )
-    return seconds
 
 
 def read_positive(path: Path, key: str) -> float | None:
