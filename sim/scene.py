@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from airground.errors import InputError
+from airground.io.input_files import SETTINGS_LIMIT, read_text
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
@@ -208,7 +209,7 @@ def load_scene(name: str) -> Scene:
     if name.endswith(".toml"):
         path = Path(name)
         try:
-            return parse_scene(path.read_text(encoding="utf-8"), str(path))
+            return parse_scene(read_text(path, SETTINGS_LIMIT), str(path))
         except (OSError, UnicodeDecodeError) as error:
             raise InputError(f"{path}: cannot read this scene file ({error})") from None
     if name not in scene_names():

@@ -6,12 +6,15 @@ import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
+from airground.io.input_files import check_file
+
 
 def bytes_digest(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
 def file_digest(path: Path) -> str:
+    check_file(path)
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -11,6 +11,7 @@ from airground.core.messages import ImuSamples, MagneticSamples
 from airground.core.se3 import SE3
 from airground.errors import RecordingError
 from airground.io.calibration import CameraTable
+from airground.io.input_files import TEXT_LIMIT, read_text
 
 IMU_COLUMNS = (
     "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
@@ -90,13 +91,14 @@ def _pose_yaml(pose: SE3) -> str:
 
 def _read_samples(path: Path, columns: int) -> tuple[I64, F64]:
     """(N,) stamps and (N, columns) values, all finite, in strict order of time."""
-    for number, line in enumerate(read_lines(path), start=1):
+    lines = read_lines(path)
+    for number, line in enumerate(lines, start=1):
         if line and not line.startswith("#"):
             _check_whole_stamp(line, number, path)
             break
     dtype = np.dtype([("stamp", np.int64), ("values", np.float64, (columns,))])
     try:
-        table = np.loadtxt(path, dtype=dtype, delimiter=",", comments="#", ndmin=1)
+        table = np.loadtxt(lines, dtype=dtype, delimiter=",", comments="#", ndmin=1)
     except (ValueError, OverflowError) as error:
         raise RecordingError(
             f"{path}: expected 'timestamp [ns]' and {columns} numbers a line: {error}"
@@ -126,10 +128,10 @@ def _write_samples(path: Path, columns: str, stamps: I64, values: F64) -> None:
     path.write_text("\n".join([columns, *lines]) + "\n", encoding="utf-8")
 
 
-def read_lines(path: Path) -> list[str]:
-    """The lines of a text file; RecordingError where it cannot be read."""
+def read_lines(path: Path, limit: int = TEXT_LIMIT) -> list[str]:
+    """The lines of a text file of at most `limit` bytes; RecordingError where it cannot be read."""
     try:
-        return path.read_text(encoding="utf-8").splitlines()
+        return read_text(path, limit).splitlines()
     except FileNotFoundError:
         raise RecordingError(f"{path}: this file is missing from the recording") from None
     except (OSError, UnicodeDecodeError) as error:

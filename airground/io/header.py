@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import reprlib
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -13,6 +12,7 @@ from pydantic import Field, ValidationError
 
 from airground.errors import RecordingError
 from airground.io.calibration import CalibrationTable, Table
+from airground.io.input_files import read_toml_text
 
 SCHEMA = 1
 _NUMBERS = re.compile(r"\[\s+([-+.\deE,\s]+?)\s+\]")  # an array of numbers over many lines
@@ -63,13 +63,12 @@ def read_header(path: Path) -> Header:
 def read_toml(path: Path) -> dict[str, Any]:
     """Raises RecordingError where the file is missing or no TOML."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return read_toml_text(path)
     except FileNotFoundError:
         raise RecordingError(f"{path}: no such file; is this a recording?") from None
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, ValueError) as error:
-        raise RecordingError(f"{path}: cannot be read as TOML: {error}") from None
-    except RecursionError:
-        raise RecordingError(f"{path}: cannot be read as TOML: nested too deep") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise RecordingError(f"{path}: cannot be read as TOML: {reason}") from None
 
 
 def write_toml(path: Path, table: Table) -> None:

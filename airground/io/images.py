@@ -17,6 +17,7 @@ from PIL.JpegImagePlugin import JpegImageFile
 
 from airground.core.arrays import F32, U8, U16, Scalar
 from airground.errors import RecordingError
+from airground.io.input_files import IMAGE_LIMIT, read_bytes
 from airground.io.png import SIGNATURE, PngHeader, decode_png, warm_up_decoding
 
 _PNG_END = b"IEND\xaeB`\x82"
@@ -101,7 +102,7 @@ def decode(data: bytes) -> NDArray[Any]:
 def _bytes(path: Path) -> bytes:
     """A file that starts as PNG or JPEG files do."""
     try:
-        data = path.read_bytes()
+        data = read_bytes(path, IMAGE_LIMIT)
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None
     if not is_image(data):

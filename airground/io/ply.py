@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from airground.core.arrays import U8
 from airground.core.cloud import PointCloud
 from airground.errors import InputError
+from airground.io.input_files import MODEL_LIMIT, read_bytes
 
 _POSITION = [("x", "<f4"), ("y", "<f4"), ("z", "<f4")]
 _NORMAL = [("nx", "<f4"), ("ny", "<f4"), ("nz", "<f4")]
@@ -45,7 +46,7 @@ def read_ply(path: Path) -> tuple[PointCloud, U8 | None]:
     """Read what `write_ply` wrote: the cloud, and the sources if they are in the file.
     InputError if the file is missing, truncated, or holds another kind of PLY."""
     try:
-        data = path.read_bytes()
+        data = read_bytes(path, MODEL_LIMIT)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     header, marker, body = data.partition(b"end_header\n")

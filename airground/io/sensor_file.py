@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from airground.errors import RecordingError
 from airground.io.calibration import MAX_SIDE_PX
 from airground.io.euroc import read_lines
 from airground.io.header import shortened
+from airground.io.input_files import SETTINGS_LIMIT, read_toml_text
 from airground.io.lens import Lens, Model
 from airground.io.plausibility import rigid
 
@@ -74,14 +74,16 @@ def read_mapping(path: Path) -> dict[str, Any]:
 
     EuRoC's first line, `%YAML:1.0`, is no YAML and is skipped. RecordingError if the file is
     missing, or is no table of keys and values."""
-    lines = read_lines(path)
     try:
         if path.suffix == ".toml":
-            return tomllib.loads("\n".join(lines))
+            return read_toml_text(path)
+        lines = read_lines(path, SETTINGS_LIMIT)
         if lines and lines[0].startswith("%YAML"):
             lines[0] = ""
         values = _PlainLoader("\n".join(lines)).get_single_data()
-    except (yaml.YAMLError, tomllib.TOMLDecodeError, ValueError) as error:
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None
+    except (yaml.YAMLError, ValueError) as error:
         reason = " ".join(str(error).split())
         raise RecordingError(f"{path}: cannot be read: {reason}") from None
     except RecursionError:

@@ -9,6 +9,7 @@ import open3d as o3d
 
 from airground.core.cloud import PointCloud
 from airground.errors import InputError
+from airground.io.input_files import check_file
 
 GREY = 128
 """Level of points without colours: the middle of 0 to 255."""
@@ -46,6 +47,7 @@ def read_map(path: Path) -> PointCloud:
 def _check_claim(path: Path) -> None:
     """Raise InputError if a header claims more elements than its file has bytes."""
     try:
+        check_file(path)
         with path.open("rb") as file:
             start = file.read(4096)
         size = path.stat().st_size

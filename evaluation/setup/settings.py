@@ -12,6 +12,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from airground.config import PRESETS, Config, Section
 from airground.errors import ConfigError
+from airground.io.input_files import read_toml_text
 from evaluation.setup.setups import PoseNoise, Reference
 
 DEFAULT_PRESET = "best"
@@ -163,10 +164,10 @@ def write_config(config: Config, path: Path) -> None:
 
 def _read(file: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
+        return read_toml_text(file)
     except OSError as error:
         raise ConfigError(f"--config {file}: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise ConfigError(f"--config {file}: no TOML: {error}") from error
 
 

@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from airground.errors import InputError
+from airground.io.input_files import check_file
 from evaluation.setup.condition import Condition
 
 CONTROL_SCENES = frozenset({"flat"})
@@ -110,6 +111,7 @@ class ResultTable:
         """Read `results.parquet`; raises InputError if the file is missing, no parquet, or lacks a
         column."""
         try:
+            check_file(path)
             frame = pd.read_parquet(path)
         except (OSError, ValueError) as error:
             raise InputError(f"{path}: no readable results table ({error})") from error

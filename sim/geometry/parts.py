@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.errors import RecordingError
+from airground.io.input_files import TEXT_LIMIT, read_text
 
 Kind = Literal["ground", "wall", "box", "rock", "stone", "plant"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -45,8 +46,7 @@ def write_parts(path: Path, parts: Sequence[Part]) -> None:
 def read_parts(path: Path) -> list[Part]:
     """Read what `write_parts` wrote; RecordingError if it is missing or wrong."""
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = list(csv.reader(file))
+        rows = list(csv.reader(read_text(path, TEXT_LIMIT).splitlines()))
     except FileNotFoundError:
         raise RecordingError(
             f"{path}: no such file; older versions of simulate did not write it"

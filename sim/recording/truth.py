@@ -75,6 +75,11 @@ class Truth:
         mesh = o3d.io.read_triangle_mesh(path) if path.is_file() else None
         if mesh is None or not mesh.has_triangles():
             raise RecordingError(f"{path}: no readable mesh with triangles")
+        vertices, triangles = np.asarray(mesh.vertices), np.asarray(mesh.triangles)
+        if not np.isfinite(vertices).all():
+            raise RecordingError(f"{path}: a vertex is not finite")
+        if triangles.min() < 0 or triangles.max() >= len(vertices):
+            raise RecordingError(f"{path}: a triangle has a vertex that is not there")
         return mesh
 
     @cached_property

@@ -23,6 +23,7 @@ from distributed import SpecCluster
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from airground.errors import InputError
+from airground.io.input_files import SETTINGS_LIMIT, read_text
 
 CLASSES = {
     "slurm": "SLURMCluster",
@@ -86,7 +87,7 @@ def read_jobs(file: Path) -> Jobs:
         InputError: The file cannot be read, or an entry is invalid.
     """
     try:
-        jobs = Jobs.model_validate(yaml.safe_load(file.read_text(encoding="utf-8")))
+        jobs = Jobs.model_validate(yaml.safe_load(read_text(file, SETTINGS_LIMIT)))
     except OSError as error:
         raise InputError(f"--cluster {file}: {error.strerror}") from None
     except (yaml.YAMLError, UnicodeDecodeError) as error:

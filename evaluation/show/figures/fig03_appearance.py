@@ -51,6 +51,8 @@ def appearance_figure(curves: Mapping[str, Mapping[str, Curve]]) -> Figure:
         column[1].set_xlabel(label)
         column[1].set_xticks(np.unique(np.concatenate([c.values for c in of_scenes.values()])))
     _finish(grid)
+    handles, labels = grid[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", ncols=len(labels))
     return figure
 
 
@@ -75,7 +77,6 @@ def _finish(grid: NDArray) -> None:
     first.set_ylim(-0.03, 1.03)
     first.yaxis.set_major_formatter(PercentFormatter(1.0))
     first.set_ylabel("MAV located")
-    first.legend(loc="best")
     grid[1, 0].set_yscale("symlog", linthresh=10)
     grid[1, 0].set_ylim(bottom=0)
     grid[1, 0].set_ylabel("right matches, median")

@@ -1,0 +1,79 @@
+"""The gate for files that users hand in: regular files of bounded size, and nothing else.
+
+A pipe would wait for ever, a device never ends, and a sparse file fills the memory.
+"""
+
+from __future__ import annotations
+
+import errno
+import re
+import stat
+import tomllib
+from pathlib import Path
+from typing import Any
+
+MIB = 1 << 20
+SETTINGS_LIMIT = 4 * MIB
+"""Largest file of settings or calibration: a thousand times what they need."""
+TEXT_LIMIT = 1024 * MIB
+"""Largest list of samples or stamps: an IMU at 1 kHz writes 400 MiB an hour."""
+IMAGE_LIMIT = 256 * MIB
+"""Largest image file: 8192 x 8192 pixels of 32 bits, not compressed."""
+MODEL_LIMIT = 8192 * MIB
+"""Largest mesh, point cloud or table: more does not fit the memory of most machines."""
+_KINDS = {
+    stat.S_ISDIR: "a folder",
+    stat.S_ISFIFO: "a pipe",
+    stat.S_ISCHR: "a device",
+    stat.S_ISBLK: "a device",
+    stat.S_ISSOCK: "a socket",
+}
+_DEEP_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){64}""")
+"""A dotted key of so many levels."""
+
+
+def read_bytes(path: Path, limit: int) -> bytes:
+    """All of a file.
+
+    Args:
+        path: File, or a link to one.
+        limit: Largest size [byte].
+
+    Raises:
+        OSError: It is missing, cannot be read, is no regular file, or is larger.
+    """
+    check_file(path, limit)
+    return path.read_bytes()
+
+
+def read_text(path: Path, limit: int) -> str:
+    """All of a text file; raises as `read_bytes`, and UnicodeDecodeError."""
+    return read_bytes(path, limit).decode("utf-8").replace("\r\n", "\n")
+
+
+def read_toml_text(path: Path) -> dict[str, Any]:
+    """A TOML file's tables.
+
+    Raises:
+        OSError: As `read_bytes`.
+        ValueError: It is no TOML.
+    """
+    text = read_text(path, SETTINGS_LIMIT)
+    if _DEEP_KEY.search(text):  # tomllib takes minutes over ten thousands of levels
+        raise ValueError("a key has more than 64 levels")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("nested too deep") from None
+
+
+def check_file(path: Path, limit: int = MODEL_LIMIT) -> None:
+    """Before a library opens a file: raises OSError as `read_bytes`."""
+    status = path.stat()
+    if not stat.S_ISREG(status.st_mode):
+        kinds = [name for is_kind, name in _KINDS.items() if is_kind(status.st_mode)]
+        kind = kinds[0] if kinds else "no file"
+        raise OSError(errno.EINVAL, f"is {kind}, expected a file", str(path))
+    if status.st_size > limit:
+        size = f"{status.st_size / MIB:.0f} MiB, expected at most {limit / MIB:.0f}"
+        raise OSError(errno.EFBIG, f"has {size}", str(path))
