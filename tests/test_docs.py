@@ -24,7 +24,10 @@ from evaluation.table.rows import ResultTable
 from sim import scene
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [
+    *(ROOT / f"{name}.md" for name in ("README", "CONTRIBUTING", "SECURITY")),
+    *sorted((ROOT / "docs").glob("*.md")),
+]
 SECTIONS = {name: getattr(Config(), name) for name in Config.model_fields}
 PARAMETER = re.compile(
     rf"(?<!airground\.)\b({'|'.join(n for n in SECTIONS if n != 'preset')})\.(\w+)"
