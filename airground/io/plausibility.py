@@ -22,6 +22,10 @@ IMU_SLACK_S = 0.05
 """The IMU may begin this much after the first image, or end before the last [s]."""
 GRAVITY_RANGE = (7.8, 12.0)
 """Median length of what an accelerometer reads on a robot [m/s^2]."""
+MAX_GYRO = 100.0
+"""Largest rate that gyros of robots measure: 4000 deg/s are 70 [rad/s]."""
+MAX_ACCELERATION = 4000.0
+"""Largest specific force that accelerometers for shocks measure: 400 g [m/s^2]."""
 START_S = 1.0
 """Over this time the accelerometer is averaged to find what is up [s]."""
 RIGID_TOLERANCE = 1e-4
@@ -81,7 +85,12 @@ def check_imu_covers(
 
 def upwards(imu: ImuSamples, imu_path: Path) -> F64:
     """(3,) unit vector that points up in the IMU as the recording starts.
-    RecordingError if the accelerometer does not read gravity in m/s^2."""
+    RecordingError if the accelerometer does not read gravity in m/s^2, or a sample is beyond what
+    IMUs measure."""
+    _check_range(imu.gyro, MAX_GYRO, "gyro reads {:.3g} rad/s", imu, imu_path)
+    _check_range(
+        imu.accelerometer, MAX_ACCELERATION, "accelerometer reads {:.3g} m/s^2", imu, imu_path
+    )
     usual = float(np.median(np.linalg.norm(imu.accelerometer, axis=1)))
     low, high = GRAVITY_RANGE
     if not low <= usual <= high:
@@ -93,6 +102,16 @@ def upwards(imu: ImuSamples, imu_path: Path) -> F64:
     mean = imu.accelerometer[start].mean(axis=0)
     result: F64 = mean / np.linalg.norm(mean)
     return result
+
+
+def _check_range(values: F64, limit: float, reads: str, imu: ImuSamples, path: Path) -> None:
+    beyond = (np.abs(values) > limit).any(axis=1)
+    if beyond.any():
+        index = int(np.argmax(beyond))
+        said = reads.format(float(np.abs(values[index]).max()))
+        raise RecordingError(
+            f"{path}: the {said} at stamp {imu.stamps_ns[index]}; expected at most {limit:g}"
+        )
 
 
 def check_up_in_camera(up_camera: F64, imu_path: Path) -> None:

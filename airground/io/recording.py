@@ -141,8 +141,18 @@ class Recording(Pair):
             assert imu is not None
             check_stamp_unit(robot.camera_stamps, self.path / camera_list, unit, CAMERA_STEP_S)
             check_stamp_unit(imu.stamps_ns, imu_file, "nanoseconds", IMU_STEP_S)
+            self._check_within(robot.camera_stamps, self.path / camera_list)
             check_imu_covers(imu, imu_file, robot.camera_stamps, nominal.camera_time_offset_ns)
             check_up_in_body(nominal.T_body_imu.rotation @ upwards(imu, imu_file), imu_file)
+
+    def _check_within(self, stamps_ns: I64, path: Path) -> None:
+        """Stamps count from the start of the recording, and do not reach beyond its end."""
+        first_s, last_s = float(stamps_ns[0]) / 1e9, float(stamps_ns[-1]) / 1e9
+        if first_s < 0 or last_s > self.duration_s:
+            raise RecordingError(
+                f"{path}: images from {first_s:.3f} to {last_s:.3f} s; expected from 0 to "
+                f"{self.duration_s:.3f} s, the duration in {layout.HEADER}"
+            )
 
 
 def _robot(

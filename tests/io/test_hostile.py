@@ -182,3 +182,28 @@ def test_clouds_that_claim_more_than_they_hold(tmp_path: Path, what: str) -> Non
     header = f"ply\nformat binary_little_endian 1.0\n{PLY_HEADERS[what]}\nend_header\n"
     file.write_bytes(header.encode() + bytes(15))
     refused(lambda: read_ply(file), r"a\.ply: (cannot read the PLY header line|holds 15 bytes)")
+
+
+def test_samples_that_no_imu_measures(tmp_path: Path) -> None:
+    ours = write_recording(tmp_path / "ours")
+    data = ours / "mav0/imu0/data.csv"
+    first, sample, *rest = data.read_text().splitlines()
+    stamp, *values = sample.split(",")
+    for at, said in ((0, "gyro reads 1e\\+300 rad/s"), (5, "accelerometer reads 1e\\+300 m/s")):
+        wrong = [*values[:at], "1e300", *values[at + 1 :]]
+        data.write_text("\n".join([first, ",".join([stamp, *wrong]), *rest]) + "\n")
+        refused(lambda: Recording.open(ours), rf"imu0/data\.csv: the {said}.* at stamp {stamp}")
+
+
+@pytest.mark.parametrize("shift_s", [100.0, -0.06])
+def test_stamps_beyond_the_recording(tmp_path: Path, shift_s: float) -> None:
+    ours = write_recording(tmp_path / "ours")
+    for name in ("cam0/data.csv", "imu0/data.csv", "mag0/data.csv"):
+        path = ours / "mav0" / name
+        first, *rest = path.read_text().splitlines()
+        moved = [
+            f"{int(line.partition(',')[0]) + round(shift_s * 1e9)},{line.partition(',')[2]}"
+            for line in rest
+        ]
+        path.write_text("\n".join([first, *moved]) + "\n")
+    refused(lambda: Recording.open(ours), r"cam0/data\.csv: images from .* expected from 0 to 0\.2")
