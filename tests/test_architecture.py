@@ -25,6 +25,7 @@ EVALUATION_LAYERS = (
 """Each imports only those before it, and itself."""
 SIM_ROOMS = (
     "interrupts",
+    "partial_folder",
     "scene",
     "geometry",
     "appearance",

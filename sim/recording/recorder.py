@@ -23,6 +23,7 @@ from airground.io.header import FrameCounts, Header
 from airground.io.images import metric_depth
 from airground.io.recording import Recording
 from sim.geometry.edges import find_edges
+from sim.partial_folder import partial_folder
 from sim.recording.frame_pool import FrameServer, make_frames
 from sim.recording.frames import FramePlan
 from sim.recording.render import with_cameras
@@ -88,28 +89,20 @@ def record(
     out = Path(out)
     if out.exists():
         raise InputError(f"{out}: already exists; name a folder that does not")
-    temporary = None
+    what = Flight(scene, seed, flight, preset, duration_s)
     try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        temporary = Path(
-            tempfile.mkdtemp(prefix=f".{out.name}.", suffix=".partial", dir=out.parent)
-        )
-        temporary.chmod(0o755)
-        what = Flight(scene, seed, flight, preset, duration_s)
-        header, plan = write_all_but_images(temporary, what)
-        _store_model(plan, what)
-        digests = _render(plan, workers, progress)
-        plan.model.unlink()
-        plan.edges.unlink()
-        recording_writer.finish(temporary, header, digests)
-        temporary.rename(out)
+        with partial_folder(out) as temporary:
+            header, plan = write_all_but_images(temporary, what)
+            _store_model(plan, what)
+            digests = _render(plan, workers, progress)
+            plan.model.unlink()
+            plan.edges.unlink()
+            recording_writer.finish(temporary, header, digests)
+            temporary.rename(out)
     except OSError as error:
         if error.errno == errno.ENOSPC:
             raise AirgroundError(f"{out}: the disk is full; nothing was recorded") from None
         raise AirgroundError(f"{out}: cannot be recorded: {error}") from None
-    finally:
-        if temporary is not None:
-            shutil.rmtree(temporary, ignore_errors=True)
     return out
 
 
