@@ -26,7 +26,7 @@ from evaluation import cli
 from evaluation.datasets.formats import FORMATS, robots_for
 from evaluation.datasets.simulated import Simulated
 from evaluation.run.given_map import read_map
-from evaluation.run.own_recordings import run_pair
+from evaluation.run.own_pair import run_pair
 from evaluation.setup import console
 from evaluation.setup.setups import Given, Setup
 from sim.recording.recorder import record
