@@ -211,7 +211,8 @@ def load_scene(name: str) -> Scene:
         try:
             return parse_scene(read_text(path, SETTINGS_LIMIT), str(path))
         except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"{path}: cannot read this scene file ({error})") from None
+            reason = error.strerror if isinstance(error, OSError) else error
+            raise InputError(f"{path}: cannot read this scene file ({reason})") from None
     if name not in scene_names():
         known = ", ".join(scene_names())
         raise InputError(f"unknown scene '{name}': known are {known}, or the path of a .toml file")
