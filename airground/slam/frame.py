@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from airground.core.arrays import F32, U8
+from airground.core.arrays import F32, U8, Floats
 from airground.core.messages import RobotCalibration
-from airground.core.se3 import SE3
 from airground.errors import InputError
-from airground.slam.rolling_shutter import GLOBAL, Shutter
+from airground.slam.rolling_shutter import GLOBAL, Shutter, shutter_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,21 +25,13 @@ class Frame:
     depth: F32 | None = None
     shutter: Shutter = GLOBAL
 
-    def turning(
-        self, calibration: RobotCalibration, before: SE3, expected: SE3, before_ns: int
+    def followed(
+        self, calibration: RobotCalibration, before: Floats, here: Floats, before_ns: int
     ) -> Frame:
-        """The same image with the shutter of a camera that turns evenly.
-
-        Args:
-            calibration: Intrinsics and readout time.
-            before, expected: `T_map_camera` at the image before and as predicted for this one: the
-                turn between whole images does not depend on the rows' times. That of the fitted
-                pose does: straightened by it, images pull the turns of the next ones to and fro.
-            before_ns: Stamp of the image before [ns].
-        """
-        turn = before.rotation.T @ expected.rotation
-        seconds = (self.stamp_ns - before_ns) * 1e-9
-        shutter = Shutter.turning(calibration.camera, calibration.readout_s, turn, seconds)
+        """The same image with the shutter that corners show: (N, 2) pixels `before`, in the image
+        at `before_ns`, and `here`."""
+        seen = before, here, (self.stamp_ns - before_ns) * 1e-9
+        shutter = shutter_of(calibration.camera, calibration.readout_s, *seen)
         return replace(self, shutter=shutter)
 
 

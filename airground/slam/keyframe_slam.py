@@ -16,7 +16,6 @@ from airground.core.messages import RobotCalibration
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.slam.culling import KeyframeCuller
-from airground.slam.depth_lookup import inverse_depths_at
 from airground.slam.doubt import Doubt, jumps, surprising
 from airground.slam.feature_tracker import FeatureTracker, expected_pixels
 from airground.slam.frame import Frame
@@ -136,10 +135,11 @@ class KeyframeSlam:
         prediction = self._predict(frame, turn)
         lost = self._seen_ns != self.stamp_ns
         there = prediction.state.pose() @ self.T_rig_camera
-        frame = frame.turning(self.calibration, self.T_map_camera(), there, self.stamp_ns)
         expected = expected_pixels(self.map, self.tracker, self.camera, self.T_map_camera(), there)
         followed = len(self.tracker.ids)
-        self.tracker.advance(frame.image, expected, 2 if lost else 0)
+        seen_px = self.tracker.advance(frame.image, expected, 2 if lost else 0)
+        frame = frame.followed(self.calibration, seen_px, self.tracker.pixels, self.stamp_ns)
+        self._mapper.straighten_first(frame.shutter)
         cut = len(self.tracker.ids) < self.parameters.min_points <= followed
         fit = self._fit(frame, prediction)
         if fit is None and self._doubt is not None:
@@ -265,7 +265,7 @@ class KeyframeSlam:
             position_sigma=prediction.position_sigma,
             min_points=self.parameters.min_points,
             rng=self._rng,
-            inverse_depths=inverse_depths_at(frame.depth, pixels, self._max_depth_m),
+            inverse_depths=frame.shutter.inverse_depths_at(frame.depth, pixels, self._max_depth_m),
             inverse_depth_sigma=self._inverse_depth_sigma,
         )
         if fit is None or (self.metric and jumps(fit.T_map_camera, expected)):

@@ -14,7 +14,6 @@ from airground.config import KeyframeSlam
 from airground.core.arrays import F32, F64, I8, I64
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from airground.slam.depth_lookup import inverse_depths_at
 from airground.slam.feature_tracker import FeatureTracker
 from airground.slam.local_mapping import CROWDED
 from airground.slam.map_adjustment import MapAdjuster
@@ -110,7 +109,7 @@ class LoopCloser:
         T_old_newest = self.map.keyframes[old].state.pose().inverse() @ T_map_rig
         last = len(self.map.keyframes) - 1
         straighten(self.map, Edge(old, last, T_old_newest, float(len(found.ids))))
-        depths = inverse_depths_at(depth, found.pixels, self.max_depth_m)
+        depths = newest.shutter.inverse_depths_at(depth, found.pixels, self.max_depth_m)
         newest.see(found.ids, newest.shutter.straight(found.pixels), depths)
         self.adjuster.adjust_all(inertial)
         fitting = np.isin(found.ids, newest.ids) & self.map.mapped(found.ids)

@@ -6,6 +6,7 @@ import numpy as np
 
 from airground.config import Config
 from airground.core.arrays import F64
+from airground.core.blas_threads import one_blas_thread
 from airground.core.messages import ImuSamples, MavImage, RobotCalibration
 from airground.core.trajectory import Trajectory
 from airground.slam.filtered_scale import FilteredScale
@@ -50,6 +51,7 @@ class MonocularSlam:
         """Take the inertial measurements up to the next image."""
         self._slam.motion.add(samples)
 
+    @one_blas_thread()
     def track(self, image: MavImage) -> TrackedPose:
         """The pose of the camera at `image`."""
         require_order(image.stamp_ns, self._last_ns)
@@ -82,6 +84,7 @@ class MonocularSlam:
             slam.corners(),
         )
 
+    @one_blas_thread()
     def finish(self) -> None:
         """Adjust the whole map."""
         if self._slam.begun:

@@ -12,10 +12,16 @@ from dataclasses import dataclass, field
 import numpy as np
 from numba import njit
 
-from airground.core.arrays import F64, Floats
+from airground.core.arrays import F32, F64, Floats
 from airground.core.camera import PinholeCamera
 from airground.slam import so3
+from airground.slam.depth_lookup import inverse_depths_at
 
+MIN_CORNERS = 15
+"""Fewer corners show no turn that can be trusted."""
+REFINEMENTS, OUTLIER = 4, 2.5
+"""Fits of the turn, each to the corners that the one before left within so many times the median:
+those of near things move by the hand's way, too."""
 INVERSE_STEPS = 4
 """Fixed-point steps from a straight pixel to that in the image: each leaves a tenth of the error
 at 3 rad/s."""
@@ -33,15 +39,6 @@ class Shutter:
     camera: PinholeCamera | None = None
     turn_per_row: F64 = field(default_factory=lambda: np.zeros(3))
 
-    @classmethod
-    def turning(cls, camera: PinholeCamera, readout_s: float, turn: F64, seconds: float) -> Shutter:
-        """The shutter of an image before which the camera turned by (3, 3), from one image to the
-        next in `seconds`."""
-        if not readout_s:
-            return GLOBAL
-        rows_a_step = seconds / readout_s * camera.height
-        return cls(camera, so3.log(np.ascontiguousarray(turn)) / rows_a_step)
-
     def straight(self, pixels: Floats) -> F64:
         """(N, 2) where pixels would be, had all rows been taken with the middle one."""
         return self._turned(pixels, inverse=False)
@@ -49,6 +46,23 @@ class Shutter:
     def in_image(self, pixels: Floats) -> F64:
         """(N, 2) where straight pixels are in the image."""
         return self._turned(pixels, inverse=True)
+
+    def inverse_depths_at(self, depth: F32 | None, pixels: Floats, max_depth_m: float) -> F64:
+        """(N,) `depth_lookup.inverse_depths_at` pixels of the image, along the optical axis of the
+        middle row [1/m]: the axis turns with the rows."""
+        inverse = inverse_depths_at(depth, pixels, max_depth_m)
+        if self.camera is None:
+            return inverse
+        result: F64 = inverse * self.lengthened(pixels)
+        return result
+
+    def lengthened(self, pixels: Floats) -> F64:
+        """(N,) inverse depth along the middle row's axis over that along the row's own: whatever
+        way the axis points, the distance is the same."""
+        assert self.camera is not None
+        here, turned = _rays(self.camera, pixels), _rays(self.camera, self.straight(pixels))
+        result: F64 = np.linalg.norm(turned, axis=1) / np.linalg.norm(here, axis=1)
+        return result
 
     def _turned(self, pixels: Floats, inverse: bool) -> F64:
         asked: F64 = np.asarray(pixels, np.float64)
@@ -62,6 +76,51 @@ class Shutter:
 
 GLOBAL = Shutter()
 """All rows at once."""
+
+
+def shutter_of(
+    camera: PinholeCamera, readout_s: float, before: Floats, here: Floats, seconds: float
+) -> Shutter:
+    """The shutter of an image by the corners that were followed into it.
+
+    Between two images a corner moves by the turn between its two rows, whatever the times of the
+    rows, if the turn is even. The turn of fitted poses does depend on the rows' times: straightened
+    by it, images would pull the turns of the next ones to and fro.
+
+    Args:
+        readout_s: Time from the first to the last row [s].
+        before, here: (N, 2) pixels of the corners in the image before and in this one.
+        seconds: Time between the two [s].
+    """
+    if not readout_s or len(here) < MIN_CORNERS:
+        return GLOBAL
+    rays = [_unit(_rays(camera, pixels)) for pixels in (before, here)]
+    chosen, turn = np.ones(len(here), bool), np.eye(3)
+    for _ in range(REFINEMENTS):
+        turn = _rotation(rays[1][chosen], rays[0][chosen])
+        off = np.linalg.norm(rays[0] - rays[1] @ turn.T, axis=1)
+        chosen = off <= OUTLIER * np.median(off)
+    later = float(np.mean(np.asarray(here)[chosen, 1] - np.asarray(before)[chosen, 1]))
+    between_s = seconds + later / camera.height * readout_s
+    return Shutter(camera, so3.log(turn) * (readout_s / camera.height / between_s))
+
+
+def _rays(camera: PinholeCamera, pixels: Floats) -> F64:
+    """(N, 3) directions with z = 1."""
+    rays: F64 = np.column_stack([pixels, np.ones(len(pixels))]) @ np.linalg.inv(camera.matrix()).T
+    return rays
+
+
+def _unit(vectors: F64) -> F64:
+    result: F64 = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    return result
+
+
+def _rotation(a: F64, b: F64) -> F64:
+    """(3, 3) rotation that brings (N, 3) vectors `a` onto `b` best (Kabsch)."""
+    u, _, vt = np.linalg.svd(b.T @ a)
+    rotation: F64 = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    return rotation
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
