@@ -22,11 +22,11 @@ MAX_COAST_S = 3.0
 reckoning drifts by centimetres meanwhile; others may have stopped or turned off."""
 POSITION_SIGMA_M = 0.02
 """Standard deviation of an inertially predicted position, from one image to the next [m]."""
-HAND_ACCELERATION = 2.0
+HAND_ACCELERATION = 3.0
 """Standard deviation of the acceleration of a hand-held camera per axis [m/s^2]."""
-HAND_VELOCITY_SIGMA = 0.05
-"""Standard deviation of its velocity by the last images per axis [m/s]: 5 mm from one image to the
-next at 30 Hz."""
+HAND_VELOCITY_SIGMA = 0.06
+"""Standard deviation of its velocity by the last images per axis [m/s]. Both together are 5 mm from
+one image to the next at 30 Hz; twice as much leaves steps of 3 cm in a real, turning recording."""
 VELOCITY_GAIN = 0.5
 """Share of the newest step in the velocity of a camera without an accelerometer."""
 ROTATION_SIGMA = 2e-3
