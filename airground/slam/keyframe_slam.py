@@ -7,6 +7,7 @@ then an image becomes a keyframe and extends the map. How a map begins is in `st
 from __future__ import annotations
 
 from dataclasses import replace
+from operator import itemgetter
 
 import numpy as np
 
@@ -56,6 +57,8 @@ class KeyframeSlam:
         inertial: Whether the map is metric and gravity-aligned and the velocity known, so
             that the accelerometer counts.
         metric: Whether the map's unit is the metre.
+        published: Whether poses of this map were given out; it is then searched for when lost.
+        settled: Whether scale and vertical are known, so that keyframes may be culled.
         moved_from: Pose of the newest image before the whole map was adjusted; None where it was
             not.
     """
@@ -91,6 +94,7 @@ class KeyframeSlam:
         self._keyframe_covariance = np.zeros((6, 6))
         self._doubt: Doubt | None = None
         self._torn = self._adrift = False
+        self.published = self.settled = False
         self.moved_from: SE3 | None = None
         self.path.clear()
         own = self.camera, self.T_rig_camera, self.parameters
@@ -108,14 +112,15 @@ class KeyframeSlam:
         """Whether there is a map to track in."""
         return self.stamp_ns is not None
 
-    def begin(self, frame: Frame, state: RigState, still: bool) -> None:
+    def begin(self, frame: Frame, state: RigState) -> None:
         """Start the map with this image as its first keyframe."""
         self.tracker.restart(frame.image)
         self.state, self.stamp_ns, self._seen_ns = state, frame.stamp_ns, frame.stamp_ns
-        self._insert(frame, still=still)
+        self._insert(frame)
 
     def begin_moving(self, start: MovingStart) -> None:
-        """Start the map with two views; its unit is the first one's median depth."""
+        """Start the map with two views; its unit is the first one's median depth. Both are part of
+        the trajectory, and so are the other images of before."""
         ids = self.map.new_points(start.pixels_first, 0)
         self.map.place(ids, start.points_map)
         for frame, state, pixels in start.views():
@@ -123,6 +128,10 @@ class KeyframeSlam:
             self.tracker.add(ids, pixels)
             self.state, self.stamp_ns, self._seen_ns = state, frame.stamp_ns, frame.stamp_ns
             self._insert(frame)
+            here = (frame.stamp_ns, self.T_map_camera())
+            beside = start.other_views if frame is start.first else ()
+            for stamp_ns, T_map_camera in sorted((here, *beside), key=itemgetter(0)):
+                self.path.note(stamp_ns, T_map_camera, self.map.keyframes)
 
     def track(self, frame: Frame) -> tuple[PoseFit | None, bool]:
         """Follow the map into the next image.
@@ -151,7 +160,7 @@ class KeyframeSlam:
             fit = self._recover(frame, prediction)
         self._move_on(frame, prediction, fit)
         self._adrift = fit is None and (self._adrift or cut or not prediction.inertial)
-        if self._in_doubt() or (fit is None and (self._adrift or len(self.path))):
+        if self._in_doubt() or (fit is None and (self._adrift or self.published)):
             return None, False
         timed = self.metric and self.calibration.imu is not None
         if self._choice.wanted(self.tracker, self.state, frame.stamp_ns, timed):
@@ -275,7 +284,7 @@ class KeyframeSlam:
 
     def _recover(self, frame: Frame, prediction: Prediction) -> PoseFit | None:
         """Look for the map where it should be, then anywhere."""
-        if not len(self.path):
+        if not self.published:
             return None
         assert self.stamp_ns is not None
         expected = prediction.state.pose() @ self.T_rig_camera
@@ -340,8 +349,8 @@ class KeyframeSlam:
         closed = not self._mapper.found_old and self._loops.close(frame.depth, self.inertial)
         if closed:
             self.state = self.state.following(before, self.map.keyframes[-1].state)
-        # Until poses are given out, scale and vertical are sought by all keyframes.
-        if len(self.path):
+        # Until scale and vertical are known, they are sought by all keyframes.
+        if self.settled:
             self._culler.cull(self.inertial)
         self.motion.forget_before(self.map.keyframes[-1].stamp_ns)
         if not self.adjuster.all_due():

@@ -93,7 +93,7 @@ class RgbdSlam:
     def _begin(self, frame: Frame) -> TrackedPose:
         slam = self._slam
         state = level_start(slam.motion, slam.calibration, frame.stamp_ns)
-        slam.begin(frame, state, still=False)
+        slam.begin(frame, state)
         points = int(slam.map.mapped(slam.tracker.ids).sum())
         if points < MIN_FIRST_POINTS:
             slam.reset()
@@ -103,5 +103,6 @@ class RgbdSlam:
                 f"{self._most_points} so far"
             )
             return TrackedPose(frame.stamp_ns, Tracking.INITIALIZING, None, waiting=waiting)
+        slam.published = slam.settled = True
         slam.note(frame.stamp_ns)
         return TrackedPose(frame.stamp_ns, Tracking.TRACKED, slam.T_map_camera())
