@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from airground.core.arrays import F64
 from airground.slam.front_end import ScaleEstimate
 from airground.slam.inertial.alignment import (
     HOPELESS_SIGMA,
@@ -21,6 +22,14 @@ MIN_SECONDS = 0.6
 """Least duration of a motion that shows the scale [s]: a take-off does so in this time."""
 MAX_KEYFRAMES = 60
 """Number of newest keyframes that a scale is searched over."""
+METRIC_SIGMA = 0.06
+"""A map becomes metric when its scale is known this well [share]. From then on inertial factors
+improve it."""
+GIVE_OUT_SIGMA = 0.03
+"""Poses of a metric map are given out when its scale is known this well [share] ..."""
+GIVE_OUT_S = 1.5
+"""... or after this duration of the map [s]. A take-off shows the scale sooner, and meanwhile
+doubles the robot's height every half second, so that a pose would be off by centimetres."""
 SETTLED_SIGMA = 0.02
 """The scale counts as known from this standard deviation on [share] ..."""
 SETTLED_TILT = np.deg2rad(0.5)
@@ -38,11 +47,11 @@ class TightScale:
     """Inertial factors in bundle adjustment hold the scale.
 
     A map begins with an unknown scale. It is scaled and turned upright once the motion shows the
-    scale to `OBSERVABLE_SIGMA`; from then on inertial factors improve both.
+    scale to `METRIC_SIGMA`; from then on inertial factors improve both.
 
     Attributes:
         estimate: How well the scale is known; None before the first alignment.
-        known: Whether poses may be given out: the map is metric.
+        known: Whether poses may be given out: the map is metric and its scale known.
         settled: Whether scale and vertical are known well.
         tilt_sigma: How well the vertical is known, per axis [rad].
     """
@@ -58,10 +67,26 @@ class TightScale:
     def update(self, tracked: bool) -> bool:
         """Look at new keyframes, `tracked` or not; returns whether the map was moved."""
         slam = self._slam
-        count = slam.map.made
         if slam.motion.buffer is None:
             self.estimate = ScaleEstimate(np.inf, observable=False)
             return False
+        moved = self._judge()
+        if slam.metric and self.estimate is not None:
+            self.known |= self.estimate.sigma < GIVE_OUT_SIGMA or self._seconds() >= GIVE_OUT_S
+        return moved
+
+    def finish(self) -> None:
+        """After the last image: give a map that is not metric yet the likeliest unit, if any."""
+        if self._slam.metric or len(self._slam.map.keyframes) < MIN_KEYFRAMES:
+            return
+        alignment = self._alignment()
+        if alignment is not None and alignment.scale_sigma < HOPELESS_SIGMA:
+            self._learn(alignment)
+            self._slam.make_upright(alignment.scale, alignment.R_map_v)
+
+    def _judge(self) -> bool:
+        """Look at new keyframes; returns whether the map was moved."""
+        slam, count = self._slam, self._slam.map.made
         fresh = count > self._judged and (not self.settled or count >= 1.5 * self._judged)
         if not fresh or count < MIN_KEYFRAMES or self._seconds() < MIN_SECONDS:
             return False
@@ -70,25 +95,25 @@ class TightScale:
         if alignment is None:
             return False
         self._learn(alignment)
-        if slam.inertial or not alignment.observable:
+        if slam.inertial:
+            return self._correct(alignment)
+        if not alignment.scale_sigma < METRIC_SIGMA:
             return False
-        self.known = True
         slam.make_inertial(alignment)
         return True
 
-    def finish(self) -> None:
-        """After the last image: give a map that is not metric yet the likeliest unit, if any."""
-        if self.known or len(self._slam.map.keyframes) < MIN_KEYFRAMES:
-            return
-        alignment = self._alignment()
-        if alignment is not None and alignment.scale_sigma < HOPELESS_SIGMA:
-            self._learn(alignment)
-            self._slam.make_upright(alignment.scale, alignment.R_map_v)
+    def _correct(self, alignment: InertialAlignment) -> bool:
+        """Adjust the whole map where its scale is off by more than chance: the window that follows
+        the robot keeps the scale of the keyframes that hold it. Returns whether it was."""
+        if not abs(np.log(alignment.scale)) > alignment.scale_sigma:
+            return False
+        self._slam.adjust_all()
+        return True
 
     def _learn(self, alignment: InertialAlignment) -> None:
         """Take over how well scale and vertical are known."""
         sigma = alignment.scale_sigma
-        if self.known and self.estimate is not None:
+        if self._slam.metric and self.estimate is not None:
             # A metric map keeps its unit, whether newer motion shows it or not.
             sigma = min(sigma, self.estimate.sigma)
         self.estimate = ScaleEstimate(sigma, sigma < OBSERVABLE_SIGMA)
