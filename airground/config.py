@@ -91,6 +91,9 @@ class ViewSelection(Section):
     """Least baseline of a depth map's farthest view, across the line of sight [m]."""
     depth_map_spacing_m: Positive = 0.12
     """Distance between reference views [m]."""
+    max_scale_sigma: Positive = 0.02
+    """Standard deviation of the MAV's metric scale from which on depth maps are made, as a share;
+    poses are given out earlier."""
     min_depth_m: Positive = 0.5
     """Least distance of the scene for a reconstruction [m]; below it the MAV takes off or lands."""
 
@@ -286,7 +289,9 @@ def _as_published(preset: PresetName, sigma: float) -> Config:
     return Config(
         preset=preset,
         monocular_slam=MonocularSlam(scale="filter"),
-        view_selection=ViewSelection(both_sides=False, max_views=16, min_views=5),
+        view_selection=ViewSelection(
+            both_sides=False, max_views=16, min_views=5, max_scale_sigma=0.03
+        ),
         plane_sweep=PlaneSweep(hypotheses=200, window_px=5, smoothing="none"),
         fusion=Fusion(min_observations=1),
         height_maps=HeightMaps(cells_per_m=50.0),

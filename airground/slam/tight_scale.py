@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from airground.core.arrays import F64
 from airground.slam.front_end import ScaleEstimate
 from airground.slam.inertial.alignment import (
     HOPELESS_SIGMA,

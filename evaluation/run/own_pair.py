@@ -96,7 +96,7 @@ def write_pair(folder: Path, pair: Pair, setup: Setup, result: PairResult) -> di
         "accepted": len(accepted),
         "refused": dict(events.refused),
         "surface": result.surfaces.summary(),
-        "why": events.why(setup.config.fusion.min_depth_maps),
+        "why": events.why(setup.config),
         "map_points": {
             robot.name.lower(): int((augmented.sources == robot).sum()) for robot in Source
         },

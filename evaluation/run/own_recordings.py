@@ -25,6 +25,10 @@ from evaluation.table.tracked_share import TruePose, tracked_share_of
 from evaluation.table.tracking_log import FrontEndLog, WatchedFrontEnd
 from evaluation.table.trajectory_error import trajectory_error
 
+WELL_KNOWN_SCALE, LIKELY_SCALE = 0.02, 0.5
+"""Standard deviation of a scale up to which nothing is said of it, and from which on the poses are
+up to scale [share]: half is what the closed form needs to give a unit at all."""
+
 
 @dataclass(frozen=True, eq=False)
 class AloneResult:
@@ -58,9 +62,12 @@ def run_alone(recording: RobotRecording, front_end: FrontEnd[Any]) -> AloneResul
     return AloneResult(watched.log(), watched.trajectory(), finish_ms)
 
 
-def why_untracked(recording: RobotRecording, log: FrontEndLog) -> str:
-    """One line on why no image of a recording was tracked; empty where one was."""
-    if not log.answers or log.live_poses():
+def why_untracked(
+    recording: RobotRecording, log: FrontEndLog, final: Trajectory | None = None
+) -> str:
+    """One line on why no image of a recording was tracked; empty where one was, or where there are
+    `final` poses."""
+    if not log.answers or log.live_poses() or final is not None:
         return ""
     waiting = log.waiting or "a first pose"
     return (
@@ -68,6 +75,20 @@ def why_untracked(recording: RobotRecording, log: FrontEndLog) -> str:
         f"of the {recording.robot.name.lower()} was tracked; the front end still waited for "
         f"{waiting}"
     )
+
+
+def scale_note(recording: RobotRecording, log: FrontEndLog, final: Trajectory | None) -> str:
+    """One line on poses whose scale is not known well; empty where it is, or where depth or a file
+    gives it."""
+    scales = [answer.scale for answer in log.answers if answer.scale is not None]
+    if final is None or not scales or scales[-1].sigma <= WELL_KNOWN_SCALE:
+        return ""
+    sigma = scales[-1].sigma
+    if sigma < LIKELY_SCALE:
+        return f"the scale of the poses is known to {sigma:.1%}"
+    if recording.calibration.imu is None:
+        return "poses are up to scale: there is no IMU"
+    return f"poses are up to scale: the front end still waited for {log.waiting}"
 
 
 def write_alone(
@@ -91,7 +112,7 @@ def write_alone(
             "p95": float(np.percentile(durations_ms, 95)),
         },
         "finish_ms": result.finish_ms,
-        "why_untracked": why_untracked(recording, result.log) or None,
+        "why_untracked": why_untracked(recording, result.log, result.final) or None,
     }
     write_summary(folder, summary)
     return summary
@@ -105,6 +126,7 @@ def print_alone(summary: dict[str, Any]) -> None:
         ("tracked, from the first motion on", percent(summary["tracked_fraction"])),
         ("first pose after", seconds(summary["first_pose_s"])),
         ("lost after the first pose", str(summary["lost_images"])),
+        ("images with a final pose", str(summary["final_images"])),
         ("time a frame: mean, 95th percentile", f"{times['mean']:.1f}, {times['p95']:.1f} ms"),
     ]
     for name, error in summary["error"].items():
@@ -119,8 +141,10 @@ def print_alone(summary: dict[str, Any]) -> None:
             (f"{name} poses, scale error", f"{100 * error['scale_error']:+.2f} %"),
         ]
     title = f"{summary['robot']} alone, front end {summary['front_end']}"
-    caption = summary["why_untracked"] or (
-        "errors by evo, of the camera's position, after the alignment named"
+    caption = (
+        summary["why_untracked"]
+        or summary["scale_note"]
+        or ("errors by evo, of the camera's position, after the alignment named")
     )
     print_table(TextTable(("", "here"), tuple(rows)), title, caption, bold=(1,))
 
@@ -144,6 +168,8 @@ def robot_summary(
         "tracked_fraction": share.fraction,
         "first_pose_s": number(share.first_pose_s),
         "lost_images": share.lost_images,
+        "final_images": 0 if final is None else len(final),
+        "scale_note": scale_note(recording, log, final) or None,
         "error": {"final": _error(true_pose, final), "live": _error(true_pose, live_path(log))},
     }
 
