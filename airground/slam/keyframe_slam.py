@@ -7,7 +7,6 @@ then an image becomes a keyframe and extends the map. How a map begins is in `st
 from __future__ import annotations
 
 from dataclasses import replace
-from operator import itemgetter
 
 import numpy as np
 
@@ -54,13 +53,11 @@ class KeyframeSlam:
     Attributes:
         tracker: The corners that are followed.
         stamp_ns: Stamp of the newest state [ns]; None before the map began.
-        inertial: Whether the map is metric and gravity-aligned and the velocity known, so
-            that the accelerometer counts.
+        inertial: Whether the accelerometer counts: the map is metric and upright.
         metric: Whether the map's unit is the metre.
         published: Whether poses of this map were given out; it is then searched for when lost.
         settled: Whether scale and vertical are known, so that keyframes may be culled.
-        moved_from: Pose of the newest image before the whole map was adjusted; None where it was
-            not.
+        moved_from: Pose of the newest image before the whole map was adjusted, else None.
     """
 
     def __init__(
@@ -93,8 +90,7 @@ class KeyframeSlam:
         self._seen_ns = 0
         self._keyframe_covariance = np.zeros((6, 6))
         self._doubt: Doubt | None = None
-        self._torn = self._adrift = False
-        self.published = self.settled = False
+        self._torn = self._adrift = self.published = self.settled = False
         self.moved_from: SE3 | None = None
         self.path.clear()
         own = self.camera, self.T_rig_camera, self.parameters
@@ -119,8 +115,7 @@ class KeyframeSlam:
         self._insert(frame)
 
     def begin_moving(self, start: MovingStart) -> None:
-        """Start the map with two views; its unit is the first one's median depth. Both are part of
-        the trajectory, and so are the other images of before."""
+        """Start the map with two views; its unit is the first one's median depth."""
         ids = self.map.new_points(start.pixels_first, 0)
         self.map.place(ids, start.points_map)
         for frame, state, pixels in start.views():
@@ -128,15 +123,13 @@ class KeyframeSlam:
             self.tracker.add(ids, pixels)
             self.state, self.stamp_ns, self._seen_ns = state, frame.stamp_ns, frame.stamp_ns
             self._insert(frame)
-            here = (frame.stamp_ns, self.T_map_camera())
-            beside = start.other_views if frame is start.first else ()
-            for stamp_ns, T_map_camera in sorted((here, *beside), key=itemgetter(0)):
-                self.path.note(stamp_ns, T_map_camera, self.map.keyframes)
+        for stamp_ns, T_map_camera in start.views_before:
+            self.path.note(stamp_ns, T_map_camera, self.map.keyframes[:1])
+        self.note(start.second.stamp_ns)
 
     def track(self, frame: Frame) -> tuple[PoseFit | None, bool]:
         """Follow the map into the next image.
-        Returns the fit of the newest pose, None where the image gave none, and whether the map was
-        adjusted as a whole."""
+        Returns the fit, None where the image gave none, and whether the whole map was adjusted."""
         assert self.stamp_ns is not None
         turn, self.moved_from = self._turn, None
         if self._image_turn is not None:
@@ -196,8 +189,7 @@ class KeyframeSlam:
         self.metric = True
 
     def move(self, scale: float, R_new_map: F64, place: F64 | None = None) -> None:
-        """Scale and turn the map, about its origin or so that its newest camera is in a (3,) place
-        afterwards."""
+        """Scale and turn the map about its origin, or so that its newest camera ends in a place."""
         lever = self.T_rig_camera.translation
         self.path.scale(scale, lever)
         self.map.move(scale, R_new_map, lever)
@@ -284,9 +276,8 @@ class KeyframeSlam:
 
     def _recover(self, frame: Frame, prediction: Prediction) -> PoseFit | None:
         """Look for the map where it should be, then anywhere."""
-        if not self.published:
+        if not self.published or self.stamp_ns is None:
             return None
-        assert self.stamp_ns is not None
         expected = prediction.state.pose() @ self.T_rig_camera
         found = self._recovery.find(frame, expected, prediction.rotation_sigma is not None)
         if found is None:

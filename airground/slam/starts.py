@@ -122,8 +122,8 @@ class MovingStart:
         first_state, second_state: States of the rig, in units of the first view's median depth.
         pixels_first, pixels_second: (n, 2) pixels of the points.
         points_map: (n, 3) points in the map.
-        other_views: Stamp [ns] and pose `T_map_camera` of images before the second view, first
-            view excluded, in order of time.
+        views_before: Stamp [ns] and pose `T_map_camera` of the images before the second view, the
+            first view among them, in order of time.
     """
 
     first: Frame
@@ -133,7 +133,7 @@ class MovingStart:
     pixels_first: F64
     pixels_second: F64
     points_map: F64
-    other_views: tuple[tuple[int, SE3], ...] = ()
+    views_before: tuple[tuple[int, SE3], ...] = ()
 
     def views(self) -> tuple[tuple[Frame, RigState, F64], ...]:
         """Image, state and pixels of both."""
@@ -276,7 +276,7 @@ class TwoViewWait:
             before[good],
             here[good],
             points,
-            (*rested, *self._placed_views(placed, T_map_first)),
+            (*rested, (first.stamp_ns, T_map_first), *self._placed_views(placed, T_map_first)),
         )
 
     def _placed_views(self, points_map: F64, T_map_camera: SE3) -> list[tuple[int, SE3]]:
