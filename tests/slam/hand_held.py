@@ -1,7 +1,7 @@
 """A depth camera in a hand that turns on the spot, in the synthetic room.
 
 As a Kinect does: rows are taken one after the other, moving images are smeared, and depth is
-taken later than colour. The motion is a sum of sines, with turns of up to 3 rad/s.
+taken later than colour. The motion is a sum of sines, with turns of up to 2.1 rad/s.
 """
 
 from __future__ import annotations
