@@ -91,6 +91,9 @@ class ViewSelection(Section):
     """Least baseline of a depth map's farthest view, across the line of sight [m]."""
     depth_map_spacing_m: Positive = 0.12
     """Distance between reference views [m]."""
+    max_scale_sigma: Positive = 0.02
+    """Standard deviation of the MAV's metric scale from which on depth maps are made, as a share;
+    poses are given out earlier."""
     min_depth_m: Positive = 0.5
     """Least distance of the scene for a reconstruction [m]; below it the MAV takes off or lands."""
 
@@ -214,12 +217,21 @@ class Localization(Section):
 
 
 class Refinement(Section):
-    """Point-to-plane ICP and what it needs to converge (Sec. VII)."""
+    """Point-to-plane ICP and what it needs to converge (Sec. VII). On wide and on sparse maps all
+    lengths are multiplied by one factor (`extent_m`, `spacing_m`)."""
 
+    extent_m: Positive = 10.0
+    """Extent of the aerial surface up to which lengths hold as given; beyond, they grow with it
+    [m]."""
+    spacing_m: Positive = 0.06
+    """Median distance of neighbouring points, after `voxel_m`, up to which lengths hold as given;
+    beyond, they grow with it [m]."""
     local_search: bool = True
     """Whether the height maps around the start are searched before ICP."""
     local_search_radius_m: Positive = 0.6
     """Half the side of that search [m]."""
+    local_search_angle_deg: Annotated[float, Field(ge=0, le=180)] = 8.0
+    """Largest turn of that search to either side, in steps of 2 deg [deg]."""
     local_search_cells_per_m: Positive = 25.0
     """Resolution of that search [cells/m]."""
     level_prior: bool = True
@@ -277,7 +289,9 @@ def _as_published(preset: PresetName, sigma: float) -> Config:
     return Config(
         preset=preset,
         monocular_slam=MonocularSlam(scale="filter"),
-        view_selection=ViewSelection(both_sides=False, max_views=16, min_views=5),
+        view_selection=ViewSelection(
+            both_sides=False, max_views=16, min_views=5, max_scale_sigma=0.03
+        ),
         plane_sweep=PlaneSweep(hypotheses=200, window_px=5, smoothing="none"),
         fusion=Fusion(min_observations=1),
         height_maps=HeightMaps(cells_per_m=50.0),

@@ -52,6 +52,8 @@ class Mapping:
         self._correction: Trajectory | None = None
         self.ground_map: GroundMap | FixedMap = GroundMap(ground.camera, config.ground_mapping)
         self._poses: dict[Source, TrackedPose] = {}
+        self._max_scale_sigma = config.view_selection.max_scale_sigma
+        self._scaled = False
 
     def take(self, frame: TrackedFrame) -> Iterator[Event]:
         """Take in one frame; those of both robots come in order of time."""
@@ -61,6 +63,7 @@ class Mapping:
             self.correct_ground(frame.trajectory)
         if pose.T_map_camera is None:
             if pose.tracking is Tracking.INITIALIZING:
+                self._scaled &= robot != Source.MAV  # what comes is another map
                 yield Initializing(pose.stamp_ns, robot)
             else:
                 yield TrackingLost(pose.stamp_ns, robot)
@@ -72,7 +75,11 @@ class Mapping:
             yield PosesCorrected(stamp_ns, robot)
         match frame.image:
             case MavImage(image=image):
-                yield from self._dense.add(stamp_ns, image, pose.T_map_camera, pose.depth_range)
+                # A scale that was known stays with the map.
+                self._scaled |= scale_sigma is None or scale_sigma <= self._max_scale_sigma
+                if self._scaled:
+                    T_mav_camera = pose.T_map_camera
+                    yield from self._dense.add(stamp_ns, image, T_mav_camera, pose.depth_range)
             case GroundImage() as keyframe if self.ground_map.wants(pose.T_map_camera):
                 self.ground_map.add(keyframe, pose.T_map_camera)
                 yield GroundMapExtended(stamp_ns, self.ground_map.keyframes)

@@ -1,7 +1,5 @@
 """Point-to-plane refinement: known motions come back, nonsense is refused with a reason."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,6 @@ from tests.localization.synthetic import aerial_points, box_heap, flat_world, gr
 
 T_WORLD_MAV = SE3.from_heading(1.1, (0.5, -0.3, 0.1))
 CAMERA = np.array([0.2, 0.3, 2.2])
-REAL_PAIR = Path(__file__).parents[2] / "shared" / "real" / "icp_pair"
 
 
 def cloud(points):
@@ -155,22 +152,3 @@ def test_icp_recovers_known_motions_exactly_without_noise():
     off = fit @ truth.inverse()
     assert np.linalg.norm(off.translation) < 2e-3
     assert off.angle() < 2e-3
-
-
-@pytest.mark.skipif(not REAL_PAIR.exists(), reason="the real lidar pair is not on this machine")
-def test_icp_aligns_a_real_lidar_pair():
-    import open3d as o3d
-
-    source, target = (
-        np.asarray(o3d.io.read_point_cloud(str(REAL_PAIR / f"{name}.ply")).points)
-        for name in ("source", "target")
-    )
-    truth = SE3.from_matrix(np.loadtxt(REAL_PAIR / "T_target_source.txt"))
-    outdoor = Config().refinement.model_copy(
-        update={"max_distance_m": 1.5, "final_distance_m": 0.3, "voxel_m": 0.25, "trim": 0.9}
-    )
-    thinned = make_surfels(source, 0.25).points
-    fit = point_to_plane_icp(thinned, make_surfels(target, 0.25), SE3.identity(), outdoor)
-    off = fit @ truth.inverse()
-    assert np.linalg.norm(fit.translation - truth.translation) < 0.05
-    assert off.angle() < 0.05

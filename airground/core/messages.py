@@ -112,6 +112,7 @@ class RobotCalibration:
         T_body_imu: Pose of the IMU in the robot's body (x forward, z up).
         imu: Noise of the inertial sensor; None where the robot has none, or no gyro.
         camera_time_offset_ns: Time on the IMU's clock minus the camera's stamp [ns].
+        readout_s: Time from the first to the last row of an image [s]; 0 for a global shutter.
     """
 
     camera: PinholeCamera
@@ -119,6 +120,7 @@ class RobotCalibration:
     T_body_imu: SE3
     imu: ImuNoise | None = None
     camera_time_offset_ns: int = 0
+    readout_s: float = 0.0
 
 
 Message = MavImage | GroundImage | ImuSamples | MagneticSamples

@@ -17,6 +17,10 @@ from airground.core.camera import PinholeCamera
 
 Model = Literal["radial-tangential", "equidistant"]
 
+KINECT_READOUT_S = 0.02611
+"""Readout time of the Kinect's colour camera [s] (Ringaby and Forssen, "Scan rectification for
+structured light range sensors with rolling shutters", ICCV 2011)."""
+
 MAX_HALF_ANGLE = np.deg2rad(60.0)
 """Widest view of an undistorted image from its centre to the middle of a side [rad]. A pinhole
 image is stretched by 1 / cos^2 of the angle: by 4 here, without limit towards 90 degrees."""
@@ -42,6 +46,7 @@ class Lens:
             k4, k5, k6 of the denominator up to the eighth; s1 to s4 (thin prism) up to the
             twelfth; two tilts up to the fourteenth. Equidistant: k1, k2, k3, k4.
         model: Kind of distortion.
+        readout_s: Time from the first to the last row of an image [s]; 0 for a global shutter.
     """
 
     width: int
@@ -49,6 +54,7 @@ class Lens:
     intrinsics: tuple[float, float, float, float]
     distortion: tuple[float, ...]
     model: Model = "radial-tangential"
+    readout_s: float = 0.0
 
     def matrix(self) -> F64:
         """The (3, 3) intrinsic matrix."""
@@ -93,6 +99,8 @@ class Undistortion:
             self._nearest, _ = cv2.convertMaps(x, y, cv2.CV_16SC2, nninterpolation=True)
         fx, fy, cx, cy = (float(matrix[at]) for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
         self.camera = PinholeCamera(*size, fx, fy, cx, cy)
+        # Rows are closer together in an image that was stretched.
+        self.readout_s = lens.readout_s * lens.intrinsics[1] / fy
 
     def image(self, image: U8) -> U8:
         """Grey (H, W) or colour (H, W, 3), interpolated."""

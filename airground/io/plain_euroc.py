@@ -88,6 +88,7 @@ def open_euroc(path: Path, calibration_file: Path | None = None) -> RobotRecordi
             T_imu_camera,
             level_body(up_imu, T_imu_camera),
             inertial.noise if inertial else None,
+            readout_s=undistortion.readout_s,
         ),
         camera_stamps=stamps,
         imu=inertial.samples if inertial else None,

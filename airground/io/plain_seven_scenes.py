@@ -11,6 +11,7 @@ unless a copy says so. Frames have numbers in place of stamps."""
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ from airground.errors import RecordingError
 from airground.io.euroc import read_lines
 from airground.io.frame_numbers import stamps_of
 from airground.io.images import image_size
-from airground.io.lens import Lens
+from airground.io.lens import KINECT_READOUT_S, Lens
 from airground.io.plain_euroc import UP_LEVEL_CAMERA
 from airground.io.rgbd_folder import (
     RgbdFolder,
@@ -39,7 +40,9 @@ DEPTH_UNITS_PER_M = 1000.0
 NO_DEPTH = 65535
 """PNG value of a pixel without depth, by the data set's description."""
 INTRINSICS = "camera-intrinsics.txt"
-PUBLISHED = Lens(640, 480, (585.0, 585.0, 320.0, 240.0), (0.0, 0.0, 0.0, 0.0))
+PUBLISHED = Lens(
+    640, 480, (585.0, 585.0, 320.0, 240.0), (0.0, 0.0, 0.0, 0.0), readout_s=KINECT_READOUT_S
+)
 """The depth camera's, by the data set's description; it states none for colour."""
 
 
@@ -124,4 +127,5 @@ def _read_matrix(path: Path, width: int, height: int) -> Lens:
     if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
         raise RecordingError(f"{path}: expected three rows of three numbers")
     intrinsics = tuple(float(matrix[at]) for at in ((0, 0), (1, 1), (0, 2), (1, 2)))
-    return checked_lens(width, height, intrinsics, "radtan", (0.0,) * 4, path)
+    lens = checked_lens(width, height, intrinsics, "radtan", (0.0,) * 4, path)
+    return replace(lens, readout_s=KINECT_READOUT_S)

@@ -23,7 +23,7 @@ from airground.core.cloud import Source
 from airground.errors import RecordingError
 from airground.io.euroc import read_lines
 from airground.io.frame_numbers import SECOND_NS, are_frame_numbers, stamps_of
-from airground.io.lens import Lens
+from airground.io.lens import KINECT_READOUT_S, Lens
 from airground.io.plain_euroc import UP_LEVEL_CAMERA
 from airground.io.rgbd_folder import (
     RgbdFolder,
@@ -42,14 +42,23 @@ ACCELEROMETER = "accelerometer.txt"
 
 PUBLISHED = {
     "freiburg1": Lens(
-        640, 480, (517.3, 516.5, 318.6, 255.3), (0.2624, -0.9531, -0.0054, 0.0026, 1.1633)
+        640,
+        480,
+        (517.3, 516.5, 318.6, 255.3),
+        (0.2624, -0.9531, -0.0054, 0.0026, 1.1633),
+        readout_s=KINECT_READOUT_S,
     ),
     "freiburg2": Lens(
-        640, 480, (520.9, 521.0, 325.1, 249.7), (0.2312, -0.7849, -0.0033, -0.0001, 0.9172)
+        640,
+        480,
+        (520.9, 521.0, 325.1, 249.7),
+        (0.2312, -0.7849, -0.0033, -0.0001, 0.9172),
+        readout_s=KINECT_READOUT_S,
     ),
     "freiburg3": Lens(640, 480, (535.4, 539.2, 320.1, 247.6), (0.0, 0.0, 0.0, 0.0, 0.0)),
 }
-"""The colour cameras as the data set's authors calibrated them."""
+"""The colour cameras as the data set's authors calibrated them. The first two are Kinects; the
+readout time of the third, an Asus Xtion, is not published, and is taken as 0."""
 
 ACCELEROMETER_AXES = np.array([-1.0, -1.0, 1.0])
 """Factors from a Kinect's accelerometer (left and up positive) to the camera's axes."""

@@ -10,7 +10,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from airground.core.arrays import F64, I64, U8, U16
+from airground.core.arrays import F32, F64, I64, U8, U16
 from airground.core.cloud import Source
 from airground.core.messages import GroundImage, MavImage, RobotCalibration
 from airground.core.se3 import SE3
@@ -68,22 +68,30 @@ class RgbdFolder:
 
     def reader(self, robot: Source, undistortion: Undistortion) -> Callable[[int], Any]:
         """Reads the frame at an index: grey for the MAV, colour and depth for the ground robot."""
-        width, height = self.lens.width, self.lens.height
+        read_measured = self.depth_reader(undistortion)
 
         def read_grey_image(index: int) -> MavImage:
-            colour = read_colour(self.colour[index], width, height)
+            colour = read_colour(self.colour[index], self.lens.width, self.lens.height)
             grey = np.asarray(cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY), np.uint8)
             return MavImage(int(self.stamps_ns[index]), undistortion.image(grey))
 
         def read_image(index: int) -> GroundImage:
-            colour = read_colour(self.colour[index], width, height)
-            file = self.depth[index]
-            self._check_same_size(file, colour)
-            depth = read_depth(file, width, height, self.scale.units_per_m, self.missing)
-            stamp_ns = int(self.stamps_ns[index])
-            return GroundImage(stamp_ns, undistortion.image(colour), undistortion.depth(depth))
+            colour = read_colour(self.colour[index], self.lens.width, self.lens.height)
+            self._check_same_size(self.depth[index], colour)
+            depth = read_measured(index)
+            return GroundImage(int(self.stamps_ns[index]), undistortion.image(colour), depth)
 
         return read_grey_image if robot == Source.MAV else read_image
+
+    def depth_reader(self, undistortion: Undistortion) -> Callable[[int], F32]:
+        """Reads the depth of the frame at an index [m]."""
+        width, height = self.lens.width, self.lens.height
+
+        def read(index: int) -> F32:
+            file, scale = self.depth[index], self.scale.units_per_m
+            return undistortion.depth(read_depth(file, width, height, scale, self.missing))
+
+        return read
 
     def recording(
         self, robot: Source, calibration_file: Path | None, up_camera: F64
@@ -110,6 +118,7 @@ class RgbdFolder:
                 T_imu_camera,
                 level_body(inertial.up_imu if inertial else up_camera, T_imu_camera),
                 inertial.noise if inertial else None,
+                readout_s=undistortion.readout_s,
             ),
             camera_stamps=self.stamps_ns,
             imu=inertial.samples if inertial else None,
@@ -119,6 +128,7 @@ class RgbdFolder:
             T_pose_camera=SE3.identity(),
             frame_rate_hz=self.frame_rate_hz,
             assumed=self.assumed,
+            read_depth=self.depth_reader(undistortion) if robot == Source.MAV else None,
         )
         recording.read_image(0)
         return recording

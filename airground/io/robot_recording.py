@@ -13,7 +13,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from airground.core.arrays import I64, freeze
+from airground.core.arrays import F32, I64, freeze
 from airground.core.cloud import Source
 from airground.core.messages import (
     GroundImage,
@@ -78,6 +78,8 @@ class RobotRecording(Generic[Image]):
         frame_rate_hz: Rate by which the publisher's frame numbers became stamps [Hz]; None where
             the recording has stamps.
         assumed: What the recording does not state, and what was taken for it.
+        read_depth: Reads the measured depth of the image at an index, (height, width) float32 [m],
+            NaN where missing, of a MAV's folder that has it, for comparison alone; else None.
     """
 
     path: Path
@@ -92,6 +94,7 @@ class RobotRecording(Generic[Image]):
     T_pose_camera: SE3
     frame_rate_hz: float | None = None
     assumed: tuple[str, ...] = ()
+    read_depth: Callable[[int], F32] | None = None
 
     def __post_init__(self) -> None:
         freeze(self, "camera_stamps", (None,), np.int64)

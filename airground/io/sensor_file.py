@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +45,10 @@ NOISE_KEYS = tuple(
 )
 DEPTH_UNITS, RATE = "depth_units_per_m", "rate_hz"
 """Keys of a calibration for the value of one metre of depth, and for folders without stamps."""
+READOUT = "readout_s"
+"""Key of a camera that takes its rows one after the other."""
+MAX_READOUT_S = 0.1
+"""Rolling shutters take up to about 50 ms; a larger number is one of milliseconds."""
 
 
 _OF_WRONG_VALUES = (ValueError, LookupError, AttributeError, TypeError, OverflowError)
@@ -94,8 +99,8 @@ def read_mapping(path: Path) -> dict[str, Any]:
 
 
 def read_lens(path: Path) -> Lens:
-    """Read `resolution`, `intrinsics`, `distortion_model` and `distortion_coefficients`.
-    RecordingError names the file, the key and what would be right."""
+    """Read `resolution`, `intrinsics`, `distortion_model`, `distortion_coefficients` and, where it
+    is stated, `readout_s`. RecordingError names the file, the key and what would be right."""
     values = read_mapping(path)
     model = values.get("camera_model", "pinhole")
     if model != "pinhole":
@@ -106,7 +111,8 @@ def read_lens(path: Path) -> Lens:
     width, height = (round(v) for v in _numbers(values, "resolution", (2,), path))
     intrinsics = _numbers(values, "intrinsics", (4,), path)
     bent, coefficients = _distortion(values, path)
-    return checked_lens(width, height, intrinsics, bent, coefficients, path)
+    lens = checked_lens(width, height, intrinsics, bent, coefficients, path)
+    return replace(lens, readout_s=_readout(values, path))
 
 
 def checked_lens(
@@ -155,6 +161,18 @@ def checked_lens(
             f"back within its {width}x{height} pixels; are model and order of the numbers right?"
         )
     return lens
+
+
+def _readout(values: dict[str, Any], path: Path) -> float:
+    if READOUT not in values:
+        return 0.0
+    seconds = _positive(values[READOUT], READOUT, path)
+    if seconds > MAX_READOUT_S:
+        raise RecordingError(
+            f"{path}: key '{READOUT}': {seconds:g} s is longer than {MAX_READOUT_S:g} s; expected "
+            "seconds from the first to the last row of an image"
+        )
+    return seconds
 
 
 def read_positive(path: Path, key: str) -> float | None:

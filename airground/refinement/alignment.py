@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from airground.config import Config, Refinement
@@ -14,9 +16,14 @@ from airground.core.se3 import SE3
 from airground.refinement.icp import point_to_plane_icp
 from airground.refinement.local_search import search_nearby
 from airground.refinement.surfels import Surfels, make_surfels
+from airground.refinement.units import scale_by_extent, scale_by_spacing, scaled, without_strays
 
 MIN_POINTS = 200
+"""Least number of points of a cloud, and of the aerial points over the ground map."""
 COVER_CELLS_PER_M = 25.0
+"""Resolution at which the aligned maps are compared [cells/m]: twice a voxel of the ground map."""
+TURNING_MARGIN_M = 0.3
+"""What the searched headings move the edge of a surface of 4 m by [m]."""
 
 
 def refine(
@@ -24,41 +31,81 @@ def refine(
 ) -> Alignment:
     """Align an aerial cloud in the frame `mav` with the ground map in the frame `ground`.
     Clouds that are too small or do not overlap give a refusal with the start unchanged."""
-    settings = config.refinement
     for name, cloud in (("aerial", aerial), ("ground", ground)):
         if len(cloud) < MIN_POINTS:
             refusal = f"no structure: the {name} cloud has {len(cloud)} points of {MIN_POINTS}"
             return _refused(stamp_ns, T_ground_mav_start, refusal)
-    nearby = _nearby(ground.points, T_ground_mav_start @ aerial.points, settings)
-    if len(nearby) < MIN_POINTS:
+    points = without_strays(aerial.points)
+    overlaid = _overlay(points, ground.points, T_ground_mav_start, config.refinement)
+    if overlaid is None:
         refusal = "no overlap: the ground map has nothing below the aerial surface"
         return _refused(stamp_ns, T_ground_mav_start, refusal)
+    source, settings = overlaid.source, overlaid.settings
 
     # A better start than the guess, by the height maps nearby.
     start = T_ground_mav_start
     if settings.level_prior:
-        start = _levelled(start, aerial.points)
-    source = make_surfels(aerial.points, settings.voxel_m)
+        start = _levelled(start, points)
     if settings.local_search:
-        found = search_nearby(source.points, nearby, start, settings)
+        found = search_nearby(source.points, overlaid.nearby, start, settings)
         if found is None:
             return _refused(stamp_ns, start, "no overlap: height maps share too little nearby")
         start = found
 
-    target = make_surfels(nearby, settings.voxel_m)
-    motion = point_to_plane_icp(source.points, target, start, settings)
-    return _judged(stamp_ns, motion, source, target, settings)
+    motion = point_to_plane_icp(source.points, overlaid.target, start, settings)
+    return _judged(stamp_ns, motion, overlaid)
+
+
+@dataclass(frozen=True, eq=False)
+class _Overlay:
+    """What one alignment works on, in its units.
+
+    Attributes:
+        source: The aerial surface, thinned.
+        target: The ground map nearby, thinned.
+        nearby: (N, 3) points of the ground map that some correspondence could use [m].
+        settings: Parameters with their lengths multiplied by `scale`.
+        scale: Factor of the lengths, at least 1.
+    """
+
+    source: Surfels
+    target: Surfels
+    nearby: F32
+    settings: Refinement
+    scale: float
+
+
+def _overlay(points: F32, ground: F32, start: SE3, config: Refinement) -> _Overlay | None:
+    """Both clouds in units of their extent and spacing; None where they do not overlap."""
+    overlaid = _overlay_at(scale_by_extent(points, config), points, ground, start, config)
+    if overlaid is None:
+        return None
+    scale = scale_by_spacing([overlaid.source, overlaid.target], config)
+    if scale <= overlaid.scale:
+        return overlaid
+    return _overlay_at(scale, points, ground, start, config)
+
+
+def _overlay_at(
+    scale: float, points: F32, ground: F32, start: SE3, config: Refinement
+) -> _Overlay | None:
+    settings = scaled(config, scale)
+    nearby = _nearby(ground, start @ points, settings, scale)
+    if len(nearby) < MIN_POINTS:
+        return None
+    source, target = (make_surfels(cloud, settings.voxel_m) for cloud in (points, nearby))
+    return _Overlay(source, target, nearby, settings, scale)
 
 
 def _refused(stamp_ns: int, motion: SE3, refusal: str) -> Alignment:
     return Alignment(stamp_ns, motion, 0.0, float("nan"), False, refusal)
 
 
-def _nearby(ground: F32, aerial_ground: F64, settings: Refinement) -> F32:
+def _nearby(ground: F32, aerial_ground: F64, settings: Refinement, scale: float) -> F32:
     """Ground points that some correspondence could use, wherever the search ends."""
     margin = settings.max_distance_m
     if settings.local_search:
-        margin += settings.local_search_radius_m + 0.3
+        margin += settings.local_search_radius_m + scale * TURNING_MARGIN_M
     low, high = aerial_ground.min(axis=0)[:2] - margin, aerial_ground.max(axis=0)[:2] + margin
     inside = ((ground[:, :2] >= low) & (ground[:, :2] <= high)).all(axis=1)
     result: F32 = ground[inside]
@@ -72,15 +119,15 @@ def _levelled(motion: SE3, points: F32) -> SE3:
     return SE3(turned.rotation, motion @ centre - turned @ centre)
 
 
-def _judged(
-    stamp_ns: int, motion: SE3, source: Surfels, target: Surfels, settings: Refinement
-) -> Alignment:
+def _judged(stamp_ns: int, motion: SE3, overlaid: _Overlay) -> Alignment:
     """Inliers, their distances, and whether they suffice."""
+    source, target, settings = overlaid.source, overlaid.target, overlaid.settings
     moved = motion @ source.points
     index, squared = target.nearest(moved)
     normals = target.normals[index]
     along = np.abs(((moved - target.points[index]) * normals).sum(axis=1))
-    cover = make_height_map(target.points, COVER_CELLS_PER_M)
+    cells_per_m = COVER_CELLS_PER_M / overlaid.scale
+    cover = make_height_map(target.points, cells_per_m)
     covered = _covered(moved, cover)
     inlier = covered & (squared < settings.final_distance_m**2)
     share = float(inlier.sum() / max(covered.sum(), 1))
@@ -94,7 +141,7 @@ def _judged(
             f"{settings.min_inliers:.0%} needed"
         )
     else:
-        agreed = agreement(make_height_map(moved, COVER_CELLS_PER_M), cover)
+        agreed = agreement(make_height_map(moved, cells_per_m), cover, overlaid.scale)
         if agreed.kappa < settings.min_agreement:
             refusal = (
                 f"heights disagree: they agree over {agreed.share:.0%}, and over "

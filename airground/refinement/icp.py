@@ -10,12 +10,14 @@ from airground.core.arrays import F64, Mask
 from airground.core.se3 import SE3
 from airground.refinement.surfels import Surfels
 
-SETTLED_M = 1e-4
-"""Largest motion of a point by the last step [m]: far below the accuracy of an alignment."""
+SETTLED = 0.002
+"""Largest motion of a point by the last step, as a share of the final correspondence distance: at
+5 cm a tenth of a millimetre, far below the accuracy of an alignment."""
 MIN_CORRESPONDENCES = 50
 """Least number of correspondences for a step: six unknowns, with room for outliers."""
-SPARSE, SPARSE_ABOVE_M = 3, 0.1
-"""Only every third point is used while the correspondence distance is larger than this [m]."""
+SPARSE, SPARSE_ABOVE = 3, 2.0
+"""Only every third point is used while the correspondence distance is larger than this many times
+the final one."""
 
 
 def point_to_plane_icp(source: F64, target: Surfels, start: SE3, config: Refinement) -> SE3:
@@ -26,9 +28,11 @@ def point_to_plane_icp(source: F64, target: Surfels, start: SE3, config: Refinem
     # The distance falls by a constant factor over two thirds of the steps, then stays.
     falling = max(1, (2 * config.iterations) // 3)
     factor = (config.final_distance_m / config.max_distance_m) ** (1.0 / falling)
+    sparse_above_m = SPARSE_ABOVE * config.final_distance_m
+    settled_m = SETTLED * config.final_distance_m
     for _ in range(config.iterations):
         # While the distance is still large, a part of the points says as much as all.
-        moved = motion @ (source[::SPARSE] if distance > SPARSE_ABOVE_M else source)
+        moved = motion @ (source[::SPARSE] if distance > sparse_above_m else source)
         index, squared = target.nearest(moved)
         at_final = distance <= config.final_distance_m * 1.001
         # Nothing is trimmed before: on a floor with one box, the box is farthest off at first, and
@@ -38,7 +42,7 @@ def point_to_plane_icp(source: F64, target: Surfels, start: SE3, config: Refinem
             break
         step = _solve(moved[keep], target.points[index[keep]], target.normals[index[keep]])
         motion = step @ motion
-        if at_final and np.abs(step @ moved[keep] - moved[keep]).max() < SETTLED_M:
+        if at_final and np.abs(step @ moved[keep] - moved[keep]).max() < settled_m:
             break
         distance = max(distance * factor, config.final_distance_m)
     return motion

@@ -11,7 +11,8 @@ from airground.core.belief import HeightMap
 from airground.core.height_map import lattice_index, make_height_map
 from airground.core.se3 import SE3
 
-HEADINGS_DEG = np.arange(-8.0, 9.0, 2.0)
+HEADING_STEP_DEG = 2.0
+"""Step of the searched headings [deg]: half of it shifts the edge of a map of 4 m by one cell."""
 MIN_OVERLAP = 0.5
 MIN_CELLS = 50
 
@@ -19,16 +20,18 @@ MIN_CELLS = 50
 def search_nearby(aerial: F64, ground: F32, start: SE3, config: Refinement) -> SE3 | None:
     """The level motion T_ground_aerial around a start whose height maps agree best.
 
-    Searches shifts within the configured radius and a few degrees of heading, turned about the
-    middle of the aerial points; the height follows from the mean difference (Delta z of Sec. VI-A).
-    None where the maps do not overlap."""
+    Searches shifts within the configured radius and headings within the configured angle, turned
+    about the middle of the aerial points; the height follows from the mean difference (Delta z of
+    Sec. VI-A). None where the maps do not overlap."""
     cells_per_m = config.local_search_cells_per_m
     ground_map = make_height_map(ground, cells_per_m)
     reach = int(np.ceil(config.local_search_radius_m * cells_per_m))
     centre = aerial.mean(axis=0)
     place = np.array([*(start @ centre)[:2], 0.0])
+    steps = int(config.local_search_angle_deg / HEADING_STEP_DEG)
+    turns_deg = HEADING_STEP_DEG * np.arange(-steps, steps + 1)
     best, lowest = None, np.inf
-    for heading in start.heading() + np.deg2rad(HEADINGS_DEG):
+    for heading in start.heading() + np.deg2rad(turns_deg):
         turned = SE3.from_heading(heading)
         aerial_map = make_height_map((aerial - centre) @ turned.rotation.T + place, cells_per_m)
         cost, shift, height = _best_shift(aerial_map, ground_map, reach)

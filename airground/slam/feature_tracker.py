@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from airground.core.arrays import F64, I64, U8, Floats, Mask
+from airground.core.arrays import F32, F64, I64, U8, Floats, Mask
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam.optical_flow import flow
@@ -44,17 +44,21 @@ class FeatureTracker:
         self.clear()
         self.image = image
 
-    def advance(self, image: U8, start: Floats, extra_levels: int = 0) -> None:
+    def advance(self, image: U8, start: Floats, extra_levels: int = 0) -> F32:
         """Follow every corner into the next image from its expected pixel, (N, 2) `start`.
-        Corners that are not found go; `extra_levels` of the pyramid help a poor expectation."""
+        Corners that are not found go; `extra_levels` of the pyramid help a poor expectation.
+        Returns (M, 2) where those found were before."""
+        before = self.pixels
         if self.image is not None and len(self.ids):
             levels = self._levels + extra_levels
             pixels, found = flow(
                 self.image, image, self.pixels, start.astype(np.float32), self._window_px, levels
             )
+            before = before[found]
             self.pixels = pixels
             self.keep(found)
         self.image = image
+        return before
 
     def keep(self, kept: Mask) -> None:
         """Give up all but the marked corners."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from airground.core.arrays import F64, I64
 from airground.slam.front_end import ScaleEstimate
-from airground.slam.inertial.alignment import VisualNoise
+from airground.slam.inertial.alignment import HOPELESS_SIGMA, VisualNoise
 from airground.slam.inertial.scale_filter import ScaleFilter
 from airground.slam.inertial.stationarity import gravity_aligned
 from airground.slam.keyframe_slam import KeyframeSlam
@@ -39,6 +39,11 @@ class FilteredScale:
         tilt_sigma: How well the vertical is known, per axis [rad].
     """
 
+    @property
+    def settled(self) -> bool:
+        """Whether scale and vertical are known well."""
+        return self.known
+
     def __init__(self, slam: KeyframeSlam) -> None:
         self.estimate: ScaleEstimate | None = None
         self.known = slam.calibration.imu is None
@@ -61,6 +66,16 @@ class FilteredScale:
         self._seen = ids, slam.map.positions[ids]
         return moved
 
+    def finish(self) -> None:
+        """After the last adjustment: stay, and give a map that is not metric yet the likeliest
+        unit, if any."""
+        self.stay()
+        if self._filter is None or self.known or not self._filter.sigma < HOPELESS_SIGMA:
+            return
+        gravity = self._filter.gravity
+        if gravity is not None and len(self._slam.map.keyframes):
+            self._slam.make_upright(self._filter.scale, self._upright(gravity))
+
     def stay(self) -> None:
         """Where the whole map was adjusted, the view keeps its place and depth: the past moves.
         Adjustment by vision alone leaves both open."""
@@ -77,6 +92,12 @@ class FilteredScale:
         now_deep = (after.inverse() @ slam.map.positions[ids[kept]])[:, 2]
         scale = float(np.median(deep / now_deep))
         slam.move(scale, before.rotation @ after.rotation.T, before.translation)
+
+    def _upright(self, gravity: F64) -> F64:
+        """(3, 3) turn that makes the map upright, with the first view's x axis ahead."""
+        slam = self._slam
+        right = slam.map.keyframes[0].state.rotation @ slam.T_rig_camera.rotation[:, 0]
+        return gravity_aligned(-gravity, right)
 
     def _learn(self, scale_filter: ScaleFilter, stamp_ns: int) -> None:
         """Feed the filter with the newest image and the motion that led to it."""
@@ -100,8 +121,7 @@ class FilteredScale:
             return False
         scale, here = scale_filter.scale, slam.T_map_camera().translation
         if not self.known:
-            right = slam.map.keyframes[0].state.rotation @ slam.T_rig_camera.rotation[:, 0]
-            turn = gravity_aligned(-gravity, right)
+            turn = self._upright(gravity)
             slam.make_upright(scale, turn)
             scale_filter.follow(scale, turn, np.zeros(3), np.zeros(3))
             self.known, self.tilt_sigma = True, FILTER_TILT

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from airground.core.arrays import F32, U8
+from airground.core.arrays import F32, U8, Floats
+from airground.core.messages import RobotCalibration
 from airground.errors import InputError
+from airground.slam.rolling_shutter import GLOBAL, Shutter, shutter_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,11 +17,22 @@ class Frame:
     Attributes:
         image: (height, width) grey image.
         depth: (height, width) depth [m], NaN where missing; None without a depth camera.
+        shutter: How the camera turned while the rows were taken, as far as it is known.
     """
 
     stamp_ns: int
     image: U8
     depth: F32 | None = None
+    shutter: Shutter = GLOBAL
+
+    def followed(
+        self, calibration: RobotCalibration, before: Floats, here: Floats, before_ns: int
+    ) -> Frame:
+        """The same image with the shutter that corners show: (N, 2) pixels `before`, in the image
+        at `before_ns`, and `here`."""
+        seen = before, here, (self.stamp_ns - before_ns) * 1e-9
+        shutter = shutter_of(calibration.camera, calibration.readout_s, *seen)
+        return replace(self, shutter=shutter)
 
 
 def require_order(stamp_ns: int, last_ns: int | None) -> None:

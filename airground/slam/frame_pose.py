@@ -19,8 +19,6 @@ are this many times less certain."""
 MIN_SHARE = 0.4
 """A pose that fewer of the points agree on is chance."""
 PNP_ROUNDS = 100
-POSITION_SIGMA_M = 0.02
-"""Standard deviation of an inertially predicted position, from one image to the next [m]."""
 MOUNTING_SIGMA = np.deg2rad(0.1)
 """Standard deviation of a calibrated mounting per axis [rad]."""
 
@@ -33,7 +31,7 @@ def frame_pose(
     *,
     sigma_px: float,
     rotation_sigma: float | None,
-    inertial: bool,
+    position_sigma: float | None,
     min_points: int,
     rng: np.random.Generator,
     inverse_depths: F64 | None = None,
@@ -46,7 +44,7 @@ def frame_pose(
         pixels: (N, 2) pixels of the points in the image.
         sigma_px: Standard deviation of a pixel per axis [px].
         rotation_sigma: How well the predicted rotation is known [rad]; None if it is not.
-        inertial: Whether the predicted position is good to centimetres.
+        position_sigma: How well the predicted position is known [m]; None if it is not.
         min_points: Least number of inliers of a pose.
         inverse_depths: (N,) measured inverse depths [1/m], NaN without one; None without any.
         inverse_depth_sigma: Standard deviation of the inverse depths [1/m].
@@ -79,7 +77,9 @@ def frame_pose(
             inverse_depths=depths[chosen],
             inverse_depth_sigmas=np.full(count, inverse_depth_sigma),
             rotation_sigma=rotation_sigma,
-            position_sigma=POSITION_SIGMA_M if inertial else None,
+            position_sigma=position_sigma,
+            # With a gyro, the two-point start has the known rotation already.
+            T_map_camera_prior=T_map_camera_predicted if rotation_sigma is None else None,
         )
         if fit.inliers.sum() >= min_points and fit.inliers.sum() >= MIN_SHARE * len(points_map):
             inliers = np.zeros(len(points_map), bool)

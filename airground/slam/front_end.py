@@ -129,5 +129,6 @@ class FrontEnd(Protocol[Image_contra]):
         """Finish after the last image: run deferred optimization."""
 
     def trajectory(self) -> Trajectory | None:
-        """The newest poses of all images tracked so far, corrections included; None before the
-        first. Poses returned by `track` do not change."""
+        """The newest poses of all images tracked so far, corrections included, and of images before
+        the first of them, where they became known later; None before the first. Poses returned by
+        `track` do not change."""

@@ -70,7 +70,7 @@ def what_is_new(
 ) -> News:
     """Compare the newest image with the last keyframe; the camera turned by (3, 3) meanwhile."""
     _, here, there = np.intersect1d(tracker.ids, last.ids, return_indices=True)
-    moved = _turned(tracker.pixels[here], R_last_here, camera) - last.pixels[there]
+    moved = _turned(tracker.pixels[here], R_last_here, camera) - last.in_image()[there]
     parallax = np.linalg.norm(moved, axis=1)
     mapped_then = max(int(sparse_map.mapped(last.ids).sum()), 1)
     return News(

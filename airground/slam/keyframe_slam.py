@@ -16,7 +16,6 @@ from airground.core.messages import RobotCalibration
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.slam.culling import KeyframeCuller
-from airground.slam.depth_lookup import inverse_depths_at
 from airground.slam.doubt import Doubt, jumps, surprising
 from airground.slam.feature_tracker import FeatureTracker, expected_pixels
 from airground.slam.frame import Frame
@@ -54,11 +53,11 @@ class KeyframeSlam:
     Attributes:
         tracker: The corners that are followed.
         stamp_ns: Stamp of the newest state [ns]; None before the map began.
-        inertial: Whether the map is metric and gravity-aligned and the velocity known, so
-            that the accelerometer counts.
+        inertial: Whether the accelerometer counts: the map is metric and upright.
         metric: Whether the map's unit is the metre.
-        moved_from: Pose of the newest image before the whole map was adjusted; None where it was
-            not.
+        published: Whether poses of this map were given out; it is then searched for when lost.
+        settled: Whether scale and vertical are known, so that keyframes may be culled.
+        moved_from: Pose of the newest image before the whole map was adjusted, else None.
     """
 
     def __init__(
@@ -91,7 +90,7 @@ class KeyframeSlam:
         self._seen_ns = 0
         self._keyframe_covariance = np.zeros((6, 6))
         self._doubt: Doubt | None = None
-        self._torn = self._adrift = False
+        self._torn = self._adrift = self.published = self.settled = False
         self.moved_from: SE3 | None = None
         self.path.clear()
         own = self.camera, self.T_rig_camera, self.parameters
@@ -109,30 +108,29 @@ class KeyframeSlam:
         """Whether there is a map to track in."""
         return self.stamp_ns is not None
 
-    def begin(self, frame: Frame, state: RigState, still: bool) -> None:
+    def begin(self, frame: Frame, state: RigState) -> None:
         """Start the map with this image as its first keyframe."""
         self.tracker.restart(frame.image)
         self.state, self.stamp_ns, self._seen_ns = state, frame.stamp_ns, frame.stamp_ns
-        self._insert(frame, still=still)
+        self._insert(frame)
 
     def begin_moving(self, start: MovingStart) -> None:
         """Start the map with two views; its unit is the first one's median depth."""
-        self.tracker.restart(start.first.image)
         ids = self.map.new_points(start.pixels_first, 0)
         self.map.place(ids, start.points_map)
-        self.tracker.add(ids, start.pixels_first)
-        self.state, self.stamp_ns = start.first_state, start.first.stamp_ns
-        self._insert(start.first)
-        self.tracker.restart(start.second.image)
-        self.tracker.add(ids, start.pixels_second)
-        self.state, self.stamp_ns = start.second_state, start.second.stamp_ns
-        self._seen_ns = start.second.stamp_ns
-        self._insert(start.second)
+        for frame, state, pixels in start.views():
+            self.tracker.restart(frame.image)
+            self.tracker.add(ids, pixels)
+            self.state, self.stamp_ns, self._seen_ns = state, frame.stamp_ns, frame.stamp_ns
+            self._insert(frame)
+        for stamp_ns, T_map_camera in start.views_before:
+            self.path.note(stamp_ns, T_map_camera, self.map.keyframes[:1])
+        self.note(start.second.stamp_ns)
 
     def track(self, frame: Frame) -> tuple[PoseFit | None, bool]:
         """Follow the map into the next image.
-        Returns the fit of the newest pose, None where the image gave none, and whether the map was
-        adjusted as a whole."""
+        Returns the fit, None where the image gave none, and whether the whole map was adjusted."""
+        assert self.stamp_ns is not None
         turn, self.moved_from = self._turn, None
         if self._image_turn is not None:
             turn = self._image_turn.rig_turn(frame.image, turn, self.T_rig_camera.rotation)
@@ -141,7 +139,9 @@ class KeyframeSlam:
         there = prediction.state.pose() @ self.T_rig_camera
         expected = expected_pixels(self.map, self.tracker, self.camera, self.T_map_camera(), there)
         followed = len(self.tracker.ids)
-        self.tracker.advance(frame.image, expected, 2 if lost else 0)
+        seen_px = self.tracker.advance(frame.image, expected, 2 if lost else 0)
+        frame = frame.followed(self.calibration, seen_px, self.tracker.pixels, self.stamp_ns)
+        self._mapper.straighten_first(frame.shutter)
         cut = len(self.tracker.ids) < self.parameters.min_points <= followed
         fit = self._fit(frame, prediction)
         if fit is None and self._doubt is not None:
@@ -153,11 +153,13 @@ class KeyframeSlam:
             fit = self._recover(frame, prediction)
         self._move_on(frame, prediction, fit)
         self._adrift = fit is None and (self._adrift or cut or not prediction.inertial)
-        if self._in_doubt() or (fit is None and (self._adrift or len(self.path))):
+        if self._in_doubt() or (fit is None and (self._adrift or self.published)):
             return None, False
         timed = self.metric and self.calibration.imu is not None
         if self._choice.wanted(self.tracker, self.state, frame.stamp_ns, timed):
             before = self.T_map_camera()
+            if self.calibration.imu is None:
+                self.path.lead(frame.stamp_ns, self.state.pose(), self.map.keyframes)
             adjusted = self._insert(frame)
             self.moved_from = before if adjusted else None
             return fit, adjusted
@@ -187,8 +189,7 @@ class KeyframeSlam:
         self.metric = True
 
     def move(self, scale: float, R_new_map: F64, place: F64 | None = None) -> None:
-        """Scale and turn the map, about its origin or so that its newest camera is in a (3,) place
-        afterwards."""
+        """Scale and turn the map about its origin, or so that its newest camera ends in a place."""
         lever = self.T_rig_camera.translation
         self.path.scale(scale, lever)
         self.map.move(scale, R_new_map, lever)
@@ -246,7 +247,8 @@ class KeyframeSlam:
 
     def _predict(self, frame: Frame, turn: F64) -> Prediction:
         assert self.stamp_ns is not None
-        return self.motion.predict(self.state, turn, self.stamp_ns, frame.stamp_ns, self.inertial)
+        known = self.inertial, self.metric and self._seen_ns == self.stamp_ns
+        return self.motion.predict(self.state, turn, self.stamp_ns, frame.stamp_ns, *known)
 
     def _fit(self, frame: Frame, prediction: Prediction) -> PoseFit | None:
         """The pose by the map points that were followed into this image."""
@@ -256,15 +258,15 @@ class KeyframeSlam:
         expected = prediction.state.pose() @ self.T_rig_camera
         fit = frame_pose(
             self.map.positions[ids],
-            pixels,
+            frame.shutter.straight(pixels),
             self.camera,
             expected,
             sigma_px=self.parameters.corner_sigma_px,
             rotation_sigma=prediction.rotation_sigma,
-            inertial=prediction.inertial,
+            position_sigma=prediction.position_sigma,
             min_points=self.parameters.min_points,
             rng=self._rng,
-            inverse_depths=inverse_depths_at(frame.depth, pixels, self._max_depth_m),
+            inverse_depths=frame.shutter.inverse_depths_at(frame.depth, pixels, self._max_depth_m),
             inverse_depth_sigma=self._inverse_depth_sigma,
         )
         if fit is None or (self.metric and jumps(fit.T_map_camera, expected)):
@@ -274,12 +276,10 @@ class KeyframeSlam:
 
     def _recover(self, frame: Frame, prediction: Prediction) -> PoseFit | None:
         """Look for the map where it should be, then anywhere."""
-        if not len(self.path):
+        if not self.published or self.stamp_ns is None:
             return None
-        assert self.stamp_ns is not None
         expected = prediction.state.pose() @ self.T_rig_camera
-        found = self._recovery.near(frame.image, expected, prediction.rotation_sigma is not None)
-        found = found or self._recovery.anywhere(frame.image)
+        found = self._recovery.find(frame, expected, prediction.rotation_sigma is not None)
         if found is None:
             return None
         if surprising(found.fit.T_map_camera, expected, (frame.stamp_ns - self._seen_ns) * 1e-9):
@@ -340,8 +340,8 @@ class KeyframeSlam:
         closed = not self._mapper.found_old and self._loops.close(frame.depth, self.inertial)
         if closed:
             self.state = self.state.following(before, self.map.keyframes[-1].state)
-        # Until poses are given out, scale and vertical are sought by all keyframes.
-        if len(self.path):
+        # Until scale and vertical are known, they are sought by all keyframes.
+        if self.settled:
             self._culler.cull(self.inertial)
         self.motion.forget_before(self.map.keyframes[-1].stamp_ns)
         if not self.adjuster.all_due():

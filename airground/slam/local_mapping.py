@@ -11,7 +11,6 @@ from airground.core.arrays import F32, F64, I64
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam.corners import detect_corners
-from airground.slam.depth_lookup import inverse_depths_at
 from airground.slam.feature_tracker import FeatureTracker
 from airground.slam.frame import Frame
 from airground.slam.geometry.pose_estimation import estimate_pose
@@ -20,6 +19,7 @@ from airground.slam.inertial.preintegration import Preintegration
 from airground.slam.map_adjustment import MapAdjuster
 from airground.slam.reacquisition import find_in_keyframes, keyframes_in_view, visible
 from airground.slam.rig_state import RigState
+from airground.slam.rolling_shutter import GLOBAL, Shutter
 from airground.slam.sparse_map import CANDIDATE, DROPPED, Keyframe, SparseMap, camera_poses
 
 MAX_TRIANGULATION_ERROR_PX = 2.0
@@ -66,8 +66,17 @@ class LocalMapper:
             inertial: Whether the map is metric and gravity-aligned.
         """
         ids, pixels = self.tracker.ids.copy(), self.tracker.pixels.astype(np.float64)
-        depths = inverse_depths_at(frame.depth, pixels, self.max_depth_m)
-        keyframe = Keyframe(frame.stamp_ns, frame.image, state, ids, pixels, depths, still)
+        depths = frame.shutter.inverse_depths_at(frame.depth, pixels, self.max_depth_m)
+        keyframe = Keyframe(
+            frame.stamp_ns,
+            frame.image,
+            state,
+            ids,
+            frame.shutter.straight(pixels),
+            depths,
+            still,
+            shutter=frame.shutter,
+        )
         self.map.keyframes.append(keyframe)
         index = len(self.map.keyframes) - 1
         if motion is not None:
@@ -79,6 +88,28 @@ class LocalMapper:
         self.tracker.thin(CROWDED * self.parameters.corner_spacing_px)
         self._detect(keyframe, index, frame.depth)
         return covariance
+
+    def straighten_first(self, shutter: Shutter) -> None:
+        """Straighten the map's only keyframe by the turn to the next image: none led to it."""
+        keyframe = self.map.keyframes[0]
+        if len(self.map.keyframes) > 1 or shutter is GLOBAL or keyframe.shutter is not GLOBAL:
+            return
+        keyframe.inverse_depths = keyframe.inverse_depths * shutter.lengthened(keyframe.pixels)
+        keyframe.pixels, keyframe.shutter = shutter.straight(keyframe.pixels), shutter
+        self.map.first_pixels[keyframe.ids] = keyframe.pixels
+        self._place_by_depth(keyframe, keyframe.ids, keyframe.pixels, keyframe.inverse_depths)
+
+    def _place_by_depth(
+        self, keyframe: Keyframe, ids: I64, pixels: F64, inverse_depths: F64
+    ) -> None:
+        """Put points into the map where a keyframe sees them, if it measures their depth."""
+        known = np.isfinite(inverse_depths)
+        if known.any():
+            rays = np.column_stack([pixels[known], np.ones(known.sum())])
+            rays = rays @ np.linalg.inv(self.camera.matrix()).T
+            points_camera = rays / inverse_depths[known, None]
+            T_map_camera = keyframe.state.pose() @ self.T_rig_camera
+            self.map.place(ids[known], T_map_camera @ points_camera)
 
     def _triangulate(self, keyframe: Keyframe) -> None:
         """Place candidates whose rays from first sight and from here cross well."""
@@ -122,7 +153,7 @@ class LocalMapper:
             chosen,
             ids,
             keyframe.image,
-            expected,
+            keyframe.shutter.in_image(expected),
             self.parameters.patch_px,
             levels=1,
             search_px=REUSE_SEARCH_PX,
@@ -133,9 +164,10 @@ class LocalMapper:
         """Follow old points again if they agree with each other on where the camera is."""
         if len(ids) < MIN_REUSED:
             return False
+        straight = keyframe.shutter.straight(pixels)
         fit = estimate_pose(
             self.map.positions[ids],
-            pixels.astype(np.float64),
+            straight,
             np.full(len(ids), self.parameters.corner_sigma_px),
             self.camera,
             keyframe.state.pose() @ self.T_rig_camera,
@@ -146,9 +178,9 @@ class LocalMapper:
         if good.sum() < MIN_REUSED or good.mean() < 0.5:
             return False
         self.tracker.add(ids[good], pixels[good])
-        pixels_kept = pixels[good].astype(np.float64)
-        depths = inverse_depths_at(depth, pixels_kept, self.max_depth_m)
-        keyframe.see(ids[good], pixels_kept, depths)
+        seen_px = pixels[good].astype(np.float64)
+        depths = keyframe.shutter.inverse_depths_at(depth, seen_px, self.max_depth_m)
+        keyframe.see(ids[good], straight[good], depths)
         return True
 
     def _detect(self, keyframe: Keyframe, index: int, depth: F32 | None) -> None:
@@ -161,15 +193,10 @@ class LocalMapper:
             self.parameters.corner_spacing_px,
             None if depth is None else depth <= self.max_depth_m,
         )
-        pixels = corners.astype(np.float64)
+        pixels = keyframe.shutter.straight(corners)
         ids = self.map.new_points(pixels, index)
-        inverse_depths = inverse_depths_at(depth, pixels, self.max_depth_m)
+        seen_px = corners.astype(np.float64)
+        inverse_depths = keyframe.shutter.inverse_depths_at(depth, seen_px, self.max_depth_m)
         keyframe.see(ids, pixels, inverse_depths)
         self.tracker.add(ids, corners)
-        known = np.isfinite(inverse_depths)
-        if known.any():
-            rays = np.column_stack([pixels[known], np.ones(known.sum())])
-            rays = rays @ np.linalg.inv(self.camera.matrix()).T
-            points_camera = rays / inverse_depths[known, None]
-            T_map_camera = keyframe.state.pose() @ self.T_rig_camera
-            self.map.place(ids[known], T_map_camera @ points_camera)
+        self._place_by_depth(keyframe, ids, pixels, inverse_depths)

@@ -14,7 +14,6 @@ from airground.config import KeyframeSlam
 from airground.core.arrays import F32, F64, I8, I64
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from airground.slam.depth_lookup import inverse_depths_at
 from airground.slam.feature_tracker import FeatureTracker
 from airground.slam.local_mapping import CROWDED
 from airground.slam.map_adjustment import MapAdjuster
@@ -89,7 +88,8 @@ class LoopCloser:
         T_map_camera = self.map.keyframes[-1].state.pose() @ self.T_rig_camera
         correction = found.fit.T_map_camera @ T_map_camera.inverse()
         expected = self.camera.project(T_map_camera.inverse() @ self.map.positions[found.ids])
-        off_px = np.nan_to_num(np.linalg.norm(expected - found.pixels, axis=1), nan=np.inf)
+        straight = self.map.keyframes[-1].shutter.straight(found.pixels)
+        off_px = np.nan_to_num(np.linalg.norm(expected - straight, axis=1), nan=np.inf)
         if np.median(off_px) < MIN_DRIFT_PX:
             return False
         tilt = np.arccos(min(1.0, correction.rotation[2, 2]))
@@ -109,8 +109,8 @@ class LoopCloser:
         T_old_newest = self.map.keyframes[old].state.pose().inverse() @ T_map_rig
         last = len(self.map.keyframes) - 1
         straighten(self.map, Edge(old, last, T_old_newest, float(len(found.ids))))
-        depths = inverse_depths_at(depth, found.pixels, self.max_depth_m)
-        newest.see(found.ids, found.pixels, depths)
+        depths = newest.shutter.inverse_depths_at(depth, found.pixels, self.max_depth_m)
+        newest.see(found.ids, newest.shutter.straight(found.pixels), depths)
         self.adjuster.adjust_all(inertial)
         fitting = np.isin(found.ids, newest.ids) & self.map.mapped(found.ids)
         left = sum(len(keyframe.ids) for keyframe in self.map.keyframes) - fitting.sum()

@@ -6,6 +6,7 @@ import numpy as np
 
 from airground.config import Config
 from airground.core.arrays import F64
+from airground.core.blas_threads import one_blas_thread
 from airground.core.messages import ImuSamples, MavImage, RobotCalibration
 from airground.core.trajectory import Trajectory
 from airground.slam.filtered_scale import FilteredScale
@@ -13,8 +14,7 @@ from airground.slam.frame import Frame, require_order
 from airground.slam.front_end import ScaleEstimate, TrackedPose, Tracking
 from airground.slam.geometry.pose_estimation import PoseFit
 from airground.slam.keyframe_slam import KeyframeSlam
-from airground.slam.rig_state import RigState
-from airground.slam.starts import MovingStart, RestStart, TwoViewWait
+from airground.slam.starts import RestStart, TwoViewWait
 from airground.slam.tight_scale import TightScale
 
 MIN_TRACKED = 30
@@ -28,9 +28,9 @@ MAX_UNSEEN_S = 3.5
 class MonocularSlam:
     """A front end of the MAV, with the section `monocular_slam` of the configuration.
 
-    From rest the map is metric at once: the accelerometer carries the robot through its
-    take-off until enough points are triangulated. In motion, and always with the scale filter,
-    it begins with two views and an unknown scale, and poses are given out when that is known.
+    A map begins with two views and an unknown scale, at rest or in flight. Poses are given out
+    when the scale is known; `trajectory` also has those of the images before, back to the first
+    view. Where the motion never shows the scale, it has poses up to scale after `finish`.
     """
 
     def __init__(
@@ -42,14 +42,14 @@ class MonocularSlam:
         self._scale = self._unknown_scale()
         self._rest = RestStart(calibration)
         self._two_views = TwoViewWait(calibration, config.monocular_slam, start_rng)
-        self._rested: RigState | None = None
-        self._given_out = self._left = False
+        self._left = self._finished = False
         self._last_ns: int | None = None
 
     def add_imu(self, samples: ImuSamples) -> None:
         """Take the inertial measurements up to the next image."""
         self._slam.motion.add(samples)
 
+    @one_blas_thread()
     def track(self, image: MavImage) -> TrackedPose:
         """The pose of the camera at `image`."""
         require_order(image.stamp_ns, self._last_ns)
@@ -61,16 +61,17 @@ class MonocularSlam:
             return self._initializing(frame)
         fit, corrected = slam.track(frame)
         corrected |= self._scale.update(fit is not None)
-        if not self._given_out:
-            # A map without a published pose is not searched for: nothing leads back to it.
-            if slam.unseen_s() > MAX_UNSEEN_S or slam.stranded():
-                self._give_up()
+        if fit is not None:
+            slam.note(image.stamp_ns)
+        if self._hopeless():
+            self._give_up()
+        if not slam.published:
             if fit is None or fit.inliers.sum() < MIN_TRACKED or not self._scale.known:
                 return self._initializing(frame)
-            self._given_out = True
+            slam.published = True
+        slam.settled = self._scale.settled
         if fit is None:
             return TrackedPose(image.stamp_ns, Tracking.LOST, None, scale=self._scale.estimate)
-        slam.note(image.stamp_ns)
         return TrackedPose(
             image.stamp_ns,
             Tracking.TRACKED,
@@ -82,38 +83,41 @@ class MonocularSlam:
             slam.corners(),
         )
 
+    @one_blas_thread()
     def finish(self) -> None:
         """Adjust the whole map."""
+        self._finished = True
         if self._slam.begun:
             self._slam.adjust_all()
-            if isinstance(self._scale, FilteredScale):
-                self._scale.stay()
+            self._scale.finish()
 
     def trajectory(self) -> Trajectory | None:
-        """The newest poses of all images tracked so far."""
-        return self._slam.trajectory()
+        """The newest poses of all images tracked so far, and of those before, back to the first
+        view of the map; None before the first pose, or before `finish` where the scale stayed
+        unknown."""
+        return self._slam.trajectory() if self._slam.published or self._finished else None
 
     def _begin(self, frame: Frame) -> None:
-        """Begin the map if the robot just left its place, or two views allow it."""
+        """Begin the map if two views allow it; a robot that rested knows its gyro's bias."""
+        motion = self._slam.motion
         # Even flight reads as rest: after the first map the robot may be in the air.
-        begin = None if self._left else self._rest.observe(frame, self._slam.motion)
-        if begin is not None and self._tight:
-            self._slam.metric = self._slam.inertial = True
-            self._slam.begin(*begin, still=True)
-            self._slam.track(frame)
+        if not self._left:
+            self._rest.observe(frame, motion)
+        resting = self._rest.resting and not self._left
+        start = self._two_views.observe(frame, motion, resting)
+        if start is None:
             return
-        if begin is not None:
-            self._rested = begin[1]
-        moving = self._two_views.observe(frame, self._slam.motion)
-        if moving is not None:
-            self._begin_moving(moving)
+        rest = self._rest.rest
+        self._slam.adjuster.turns = rest is not None
+        self._slam.begin_moving(start if rest is None else start.biased(rest))
 
-    def _begin_moving(self, start: MovingStart) -> None:
-        """Begin with two views; a robot that was at rest before knows its gyro's bias."""
-        if self._rested is not None:
-            start = start.biased(self._rested)
-        self._slam.adjuster.turns = self._rested is not None
-        self._slam.begin_moving(start)
+    def _hopeless(self) -> bool:
+        """Whether a map with an unknown scale is lost for good. One without a published pose is
+        not searched for: nothing leads back to it."""
+        slam = self._slam
+        if not slam.published:
+            return slam.stranded() or slam.unseen_s() > MAX_UNSEEN_S
+        return not self._scale.settled and slam.unseen_s() > MAX_UNSEEN_S
 
     def _give_up(self) -> None:
         """Forget the map, and all that was known of its unit."""

@@ -20,6 +20,15 @@ map begins anew [ns]."""
 MAX_COAST_S = 3.0
 """For this long a robot is believed to go on without a look at the scene. Inertial dead
 reckoning drifts by centimetres meanwhile; others may have stopped or turned off."""
+POSITION_SIGMA_M = 0.02
+"""Standard deviation of an inertially predicted position, from one image to the next [m]."""
+HAND_ACCELERATION = 3.0
+"""Standard deviation of the acceleration of a hand-held camera per axis [m/s^2]."""
+HAND_VELOCITY_SIGMA = 0.06
+"""Standard deviation of its velocity by the last images per axis [m/s]. Both together are 5 mm from
+one image to the next at 30 Hz; twice as much leaves steps of 3 cm in a real, turning recording."""
+VELOCITY_GAIN = 0.5
+"""Share of the newest step in the velocity of a camera without an accelerometer."""
 ROTATION_SIGMA = 2e-3
 """Standard deviation of the gyro's turn between images, by clock, mounting and bias [rad]."""
 
@@ -31,11 +40,13 @@ class Prediction:
     Attributes:
         state: Predicted state.
         rotation_sigma: How well the rotation is known [rad]; None without a gyro.
+        position_sigma: How well the position is known per axis [m]; None where it is not.
         inertial: Whether position and velocity follow the accelerometer, too.
     """
 
     state: RigState
     rotation_sigma: float | None
+    position_sigma: float | None
     inertial: bool
 
 
@@ -75,7 +86,13 @@ class MotionModel:
         return motion if motion.longest_gap_s <= MAX_GAP_S else None
 
     def predict(
-        self, state: RigState, turn: F64, start_ns: int, end_ns: int, metric: bool
+        self,
+        state: RigState,
+        turn: F64,
+        start_ns: int,
+        end_ns: int,
+        inertial: bool,
+        followed: bool = False,
     ) -> Prediction:
         """The state at `end_ns`.
 
@@ -83,17 +100,21 @@ class MotionModel:
             state: State at `start_ns`.
             turn: (3, 3) rotation to the previous image, used without a gyro.
             start_ns, end_ns: Stamps of two images [ns].
-            metric: Whether the map's unit is the metre and its z axis points up.
+            inertial: Whether the accelerometer counts.
+            followed: Whether the image at `start_ns` gave a pose, in metres.
         """
         seconds = (end_ns - start_ns) * 1e-9
         motion = self.preintegrate(start_ns, end_ns, state)
         coasted = replace(state, position=state.position + seconds * state.velocity)
         if motion is None:
-            return Prediction(replace(coasted, rotation=state.rotation @ turn), None, False)
-        if not metric:
+            turned = replace(coasted, rotation=state.rotation @ turn)
+            hand_m = HAND_ACCELERATION * seconds**2 + HAND_VELOCITY_SIGMA * seconds
+            hand_held = followed and self.buffer is None
+            return Prediction(turned, None, hand_m if hand_held else None, False)
+        if not inertial:
             rotation, _, _ = motion.corrected(state.gyro_bias, state.accelerometer_bias)
             rotation = state.rotation @ rotation
-            return Prediction(replace(coasted, rotation=rotation), ROTATION_SIGMA, False)
+            return Prediction(replace(coasted, rotation=rotation), ROTATION_SIGMA, None, False)
         rotation, position, velocity = motion.predict(
             state.rotation,
             state.position,
@@ -102,7 +123,7 @@ class MotionModel:
             state.accelerometer_bias,
         )
         predicted = replace(state, rotation=rotation, position=position, velocity=velocity)
-        return Prediction(predicted, ROTATION_SIGMA, True)
+        return Prediction(predicted, ROTATION_SIGMA, POSITION_SIGMA_M, True)
 
     def measured(
         self, before: RigState, prediction: Prediction, T_map_rig: SE3, seconds: float | None
@@ -114,7 +135,10 @@ class MotionModel:
             return state
         if seconds is None:
             return replace(state, velocity=np.zeros(3))
-        return replace(state, velocity=(state.position - before.position) / seconds)
+        step = (state.position - before.position) / seconds
+        if prediction.position_sigma is None:
+            return replace(state, velocity=step)
+        return replace(state, velocity=state.velocity + VELOCITY_GAIN * (step - state.velocity))
 
     def coasted(self, before: RigState, prediction: Prediction, unseen_s: float) -> RigState:
         """The state at an image that shows nothing, `unseen_s` after the last one with a pose [s]:

@@ -83,7 +83,7 @@ def find_again(
     old = sparse_map.keyframes[keyframe]
     order = np.argsort(old.ids)
     rows = order[np.searchsorted(old.ids, ids, sorter=order)]
-    pixels = old.pixels[rows].astype(np.float32)
+    pixels = old.in_image()[rows].astype(np.float32)
     found_px, found = flow_both_ways(
         old.image, image, pixels, start.astype(np.float32), window_px, levels, MAX_RETURN_PX
     )

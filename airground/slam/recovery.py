@@ -11,9 +11,11 @@ from airground.config import KeyframeSlam
 from airground.core.arrays import F32, F64, I64, U8
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
+from airground.slam.frame import Frame
 from airground.slam.geometry.pose_estimation import PoseFit, estimate_pose
 from airground.slam.geometry.relocalization import KeyframeIndex
 from airground.slam.reacquisition import find_in_keyframes, keyframes_in_view, visible
+from airground.slam.rolling_shutter import GLOBAL, Shutter
 from airground.slam.sparse_map import SparseMap
 
 MIN_FOUND = 20
@@ -31,7 +33,8 @@ NOTHING = np.empty(0, np.int64)
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """The map, found again: points (n,) seen at pixels (n, 2), and the camera's pose by them."""
+    """The map, found again: points (n,) seen at pixels (n, 2) of the image, and the camera's pose
+    by them."""
 
     ids: I64
     pixels: F64
@@ -51,7 +54,7 @@ class Recovery:
     def add_keyframe(self) -> None:
         """Make the newest keyframe known."""
         keyframe = self.map.keyframes[-1]
-        self._index.add(keyframe.stamp_ns, keyframe.image, keyframe.ids, keyframe.pixels)
+        self._index.add(keyframe.stamp_ns, keyframe.image, keyframe.ids, keyframe.in_image())
 
     def forget(self, stamp_ns: int) -> None:
         """Do not look for the keyframe of that stamp any more."""
@@ -64,6 +67,7 @@ class Recovery:
         turn_known: bool = False,
         among: Sequence[int] | None = None,
         without: I64 = NOTHING,
+        shutter: Shutter = GLOBAL,
     ) -> Found | None:
         """Look where the map should be if the camera is about there.
 
@@ -72,6 +76,7 @@ class Recovery:
             turn_known: Whether the rotation is known from a gyro.
             among: Keyframes to look for; all by default.
             without: Numbers of points not to look for.
+            shutter: How the camera turned while the rows of the image were taken.
         """
         least = MIN_FOUND_TURN_KNOWN if turn_known else MIN_FOUND
         candidates = list(range(len(self.map.keyframes)) if among is None else among)
@@ -81,15 +86,27 @@ class Recovery:
         seen = (self.map, candidates, T_map_camera, self.T_rig_camera, ids, KEYFRAMES, least)
         chosen = keyframes_in_view(*seen) or keyframes_in_view(*seen, MAX_TURN_DEG)
         again, found = find_in_keyframes(
-            self.map, chosen, ids, image, expected, self.parameters.patch_px, LEVELS
+            self.map,
+            chosen,
+            ids,
+            image,
+            shutter.in_image(expected),
+            self.parameters.patch_px,
+            LEVELS,
         )
-        return self._agreed(again, found, T_map_camera, least, TURN_SIGMA if turn_known else None)
+        rotation_sigma = TURN_SIGMA if turn_known else None
+        return self._agreed(again, found, shutter, T_map_camera, least, rotation_sigma)
 
-    def anywhere(self, image: U8) -> Found | None:
+    def find(self, frame: Frame, T_map_camera: SE3, turn_known: bool) -> Found | None:
+        """Look where the map should be, then anywhere."""
+        there = self.near(frame.image, T_map_camera, turn_known, shutter=frame.shutter)
+        return there or self.anywhere(frame.image, frame.shutter)
+
+    def anywhere(self, image: U8, shutter: Shutter = GLOBAL) -> Found | None:
         """Compare the image with all keyframes."""
         found = self._index.find(image, self.camera, self._places)
         # Descriptors find the place, patches the pixel.
-        return None if found is None else self.near(image, found.fit.T_map_camera)
+        return None if found is None else self.near(image, found.fit.T_map_camera, shutter=shutter)
 
     def again(self, among: list[int], without: I64) -> Found | None:
         """Look for the places of old keyframes in the newest one; some points do not count."""
@@ -101,14 +118,21 @@ class Recovery:
         found = self._index.find(newest.image, self.camera, self._places, alike)
         if found is None:
             return None
-        return self.near(newest.image, found.fit.T_map_camera, among=among, without=without)
+        place = found.fit.T_map_camera
+        return self.near(newest.image, place, among=among, without=without, shutter=newest.shutter)
 
     def _places(self, ids: I64) -> F64:
         """(n, 3) positions of points, NaN where they have none."""
         return np.where(self.map.mapped(ids)[:, None], self.map.positions[ids], np.nan)
 
     def _agreed(
-        self, ids: I64, pixels: F32, T_map_camera: SE3, least: int, rotation_sigma: float | None
+        self,
+        ids: I64,
+        pixels: F32,
+        shutter: Shutter,
+        T_map_camera: SE3,
+        least: int,
+        rotation_sigma: float | None,
     ) -> Found | None:
         """The pose by points that were found, if they agree."""
         placed = self.map.mapped(ids)
@@ -117,7 +141,7 @@ class Recovery:
             return None
         fit = estimate_pose(
             self.map.positions[ids],
-            seen,
+            shutter.straight(seen),
             np.full(len(ids), self.parameters.corner_sigma_px),
             self.camera,
             T_map_camera,

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from airground.config import Config
+from airground.core.blas_threads import one_blas_thread
 from airground.core.messages import GroundImage, ImuSamples, RobotCalibration
 from airground.core.trajectory import Trajectory
 from airground.slam.frame import Frame, require_order
@@ -50,6 +51,7 @@ class RgbdSlam:
         """Take the inertial measurements up to the next image."""
         self._slam.motion.add(samples)
 
+    @one_blas_thread()
     def track(self, image: GroundImage) -> TrackedPose:
         """The pose of the camera at `image`."""
         require_order(image.stamp_ns, self._last_ns)
@@ -78,6 +80,7 @@ class RgbdSlam:
             corners=slam.corners(),
         )
 
+    @one_blas_thread()
     def finish(self) -> None:
         """Adjust the whole map."""
         if self._slam.begun:
@@ -90,7 +93,7 @@ class RgbdSlam:
     def _begin(self, frame: Frame) -> TrackedPose:
         slam = self._slam
         state = level_start(slam.motion, slam.calibration, frame.stamp_ns)
-        slam.begin(frame, state, still=False)
+        slam.begin(frame, state)
         points = int(slam.map.mapped(slam.tracker.ids).sum())
         if points < MIN_FIRST_POINTS:
             slam.reset()
@@ -100,5 +103,6 @@ class RgbdSlam:
                 f"{self._most_points} so far"
             )
             return TrackedPose(frame.stamp_ns, Tracking.INITIALIZING, None, waiting=waiting)
+        slam.published = slam.settled = True
         slam.note(frame.stamp_ns)
         return TrackedPose(frame.stamp_ns, Tracking.TRACKED, slam.T_map_camera())

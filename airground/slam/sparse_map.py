@@ -12,6 +12,7 @@ from airground.core.se3 import SE3
 from airground.slam.inertial.alignment import InertialAlignment
 from airground.slam.inertial.stationarity import Rest
 from airground.slam.rig_state import RigState
+from airground.slam.rolling_shutter import GLOBAL, Shutter
 
 FIRST_POINTS = 4096
 DEPTH_RANGE_PERCENT = 2.0
@@ -27,11 +28,12 @@ class Keyframe:
     Attributes:
         image: (height, width) uint8 grey image.
         ids: (n,) int64 numbers of the points seen, each once.
-        pixels: (n, 2) float64 pixels of the points.
+        pixels: (n, 2) float64 pixels of the points, straight (`rolling_shutter`).
         inverse_depths: (n,) measured inverse depths [1/m]; NaN without one.
         still: Whether the robot was at rest.
         held: Whether a neighbour was culled with its inertial motion. The poses then contain its
             information on scale and vertical, which adjusting the whole map must not lose.
+        shutter: How the camera turned while the rows were taken.
     """
 
     stamp_ns: int
@@ -42,12 +44,17 @@ class Keyframe:
     inverse_depths: F64
     still: bool = False
     held: bool = False
+    shutter: Shutter = GLOBAL
 
     def see(self, ids: I64, pixels: F64, inverse_depths: F64) -> None:
         """Add observations of points that this keyframe does not have yet."""
         self.ids = np.concatenate([self.ids, ids])
         self.pixels = np.concatenate([self.pixels, pixels])
         self.inverse_depths = np.concatenate([self.inverse_depths, inverse_depths])
+
+    def in_image(self) -> F64:
+        """(n, 2) where the points are in the image."""
+        return self.shutter.in_image(self.pixels)
 
     def forget(self, wrong: Mask) -> None:
         """Drop observations, (n,) marked."""

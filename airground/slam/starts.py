@@ -1,4 +1,4 @@
-"""The start of a map: level, at rest, or with two views from a robot in motion."""
+"""The start of a map: level, or with two views from a robot in motion, perhaps after a rest."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airground.config import KeyframeSlam
-from airground.core.arrays import F64
+from airground.core.arrays import F32, F64, I64
 from airground.core.messages import RobotCalibration
+from airground.core.se3 import SE3
 from airground.slam.corners import detect_corners
 from airground.slam.feature_tracker import FeatureTracker
 from airground.slam.frame import Frame
+from airground.slam.geometry.pose_estimation import estimate_pose
 from airground.slam.geometry.two_view import TwoViewStart, start_from_two_views
 from airground.slam.inertial.preintegration import GRAVITY
 from airground.slam.inertial.stationarity import Rest, at_rest, gravity_aligned
@@ -22,7 +24,13 @@ from airground.slam.rig_state import RigState
 
 REST_WINDOW_NS = 500_000_000
 REST_FRAMES = 6
-"""A slow beginning hides in the noise at first: the map begins this many images earlier."""
+"""A slow beginning hides in the noise at first: what the IMU read counts as of this many images
+earlier."""
+RESTING_VIEW_NS = 500_000_000
+"""While the robot rests, its first view is chosen anew so often [ns]: inertial motion from there
+is short."""
+MOST_BETWEEN = 300
+"""Images after the first view that get a pose once the map begins: ten seconds at 30 Hz."""
 STANDING_M = 0.005
 """A robot whose camera stays within this [m] for a while stands still, if its IMU says so."""
 START_LEVELS = 3
@@ -79,35 +87,30 @@ class StandStill:
 
 
 class RestStart:
-    """Waits beside a robot at rest until it begins to move."""
+    """What the IMU read while the robot rested before it began to move."""
 
     def __init__(self, calibration: RobotCalibration) -> None:
-        self._calibration = calibration
-        self._resting: deque[tuple[Frame, RigState]] = deque(maxlen=REST_FRAMES)
+        self._noise = calibration.imu
+        self._window: deque[Rest] = deque(maxlen=REST_FRAMES)
+        self.rest: Rest | None = None
+        """Readings of the last rest that ended; None before."""
 
     @property
     def resting(self) -> bool:
         """Whether the robot rested at the newest image."""
-        return bool(self._resting)
+        return bool(self._window)
 
-    def observe(self, frame: Frame, motion: MotionModel) -> tuple[Frame, RigState] | None:
-        """Take in the next image; once the robot moved, an image and the state at rest."""
-        noise = self._calibration.imu
-        if motion.buffer is None or noise is None:
-            return None
+    def observe(self, frame: Frame, motion: MotionModel) -> None:
+        """Take in the next image."""
+        if motion.buffer is None or self._noise is None:
+            return
         now = motion.imu_time(frame.stamp_ns)
-        samples = motion.buffer.between(now - REST_WINDOW_NS, now)
-        rest = at_rest(samples, noise)
-        if rest is None:
-            began = self._resting[0] if self._resting else None
-            self._resting.clear()
-            return began
-        rotation = gravity_aligned(
-            rest.specific_force, self._calibration.T_imu_camera.rotation[:, 0]
-        )
-        state = RigState.at_origin(rotation).standing(rest)
-        self._resting.append((frame, _centred(state, self._calibration)))
-        return None
+        rest = at_rest(motion.buffer.between(now - REST_WINDOW_NS, now), self._noise)
+        if rest is not None:
+            self._window.append(rest)
+        elif self._window:
+            self.rest = self._window[0]
+            self._window.clear()
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +122,8 @@ class MovingStart:
         first_state, second_state: States of the rig, in units of the first view's median depth.
         pixels_first, pixels_second: (n, 2) pixels of the points.
         points_map: (n, 3) points in the map.
+        views_before: Stamp [ns] and pose `T_map_camera` of the images before the second view, the
+            first view among them, in order of time.
     """
 
     first: Frame
@@ -128,18 +133,35 @@ class MovingStart:
     pixels_first: F64
     pixels_second: F64
     points_map: F64
+    views_before: tuple[tuple[int, SE3], ...] = ()
 
-    def biased(self, known: RigState) -> MovingStart:
-        """The same start with the biases of another state."""
+    def views(self) -> tuple[tuple[Frame, RigState, F64], ...]:
+        """Image, state and pixels of both."""
+        return (
+            (self.first, self.first_state, self.pixels_first),
+            (self.second, self.second_state, self.pixels_second),
+        )
+
+    def biased(self, rest: Rest) -> MovingStart:
+        """The same start with the biases that the IMU showed at rest."""
         biases = {
-            "gyro_bias": known.gyro_bias,
-            "accelerometer_bias": known.accelerometer_bias,
+            "gyro_bias": rest.gyro,
+            "accelerometer_bias": rest.accelerometer_bias,
         }
         return replace(
             self,
             first_state=replace(self.first_state, **biases),
             second_state=replace(self.second_state, **biases),
         )
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """Corners of the first view in a later image: their numbers (n,) and pixels (n, 2)."""
+
+    stamp_ns: int
+    ids: I64
+    pixels: F32
 
 
 class TwoViewWait:
@@ -154,15 +176,24 @@ class TwoViewWait:
         self._first: Frame | None = None
         self._corners = np.empty((0, 2), np.float32)
         self._blind = self._pass_over = 0
+        self._rested_ns: list[int] = []
+        self._between: deque[_View] = deque(maxlen=MOST_BETWEEN)
 
-    def observe(self, frame: Frame, motion: MotionModel) -> MovingStart | None:
-        """Take in the next image; the start, once there is one."""
+    def observe(
+        self, frame: Frame, motion: MotionModel, resting: bool = False
+    ) -> MovingStart | None:
+        """Take in the next image, of a robot at rest or not; the start, once there is one."""
         if self._pass_over:
             self._pass_over -= 1
             return None
         self._tracker.advance(frame.image, self._tracker.pixels)
         few = len(self._tracker.ids) < MIN_LEFT * max(len(self._corners), MIN_CORNERS)
         if self._first is None or few:
+            self._rested_ns.clear()
+            self._restart(frame)
+            return None
+        if resting and frame.stamp_ns - self._first.stamp_ns >= RESTING_VIEW_NS:
+            self._rested_ns += [self._first.stamp_ns, *(view.stamp_ns for view in self._between)]
             self._restart(frame)
             return None
         before = self._corners[self._tracker.ids].astype(np.float64)
@@ -180,6 +211,8 @@ class TwoViewWait:
             sigma_px=self._parameters.corner_sigma_px,
         )
         if not start.good or start.T_a_b is None:
+            ids, pixels = self._tracker.ids.copy(), self._tracker.pixels.copy()
+            self._between.append(_View(frame.stamp_ns, ids, pixels))
             return None
         return self._made(self._first, frame, start, before, here, motion)
 
@@ -206,6 +239,7 @@ class TwoViewWait:
         )
         self._tracker.add(np.arange(len(self._corners)), self._corners)
         self._first = frame
+        self._between.clear()
         blind = len(self._corners) < MIN_LEFT * MIN_CORNERS
         self._blind = self._blind + 1 if blind else 0
         self._pass_over = min(max(self._blind - 1, 0), MOST_PASSED_OVER)
@@ -230,6 +264,10 @@ class TwoViewWait:
         T_map_first = state.pose() @ T_rig_camera
         T_map_second = T_map_first @ start.T_a_b @ T_rig_camera.inverse()
         good = start.inliers
+        points = T_map_first @ start.points_a[good]
+        placed = np.full((len(self._corners), 3), np.nan)
+        placed[self._tracker.ids[good]] = points
+        rested = [(stamp_ns, T_map_first) for stamp_ns in self._rested_ns]
         return MovingStart(
             first,
             second,
@@ -237,5 +275,25 @@ class TwoViewWait:
             state.posed(T_map_second),
             before[good],
             here[good],
-            T_map_first @ start.points_a[good],
+            points,
+            (*rested, (first.stamp_ns, T_map_first), *self._placed_views(placed, T_map_first)),
         )
+
+    def _placed_views(self, points_map: F64, T_map_camera: SE3) -> list[tuple[int, SE3]]:
+        """Stamps and poses of the images since the first view, which has this pose, by the (n, 3)
+        places of its corners; NaN for a corner without one."""
+        placed = []
+        for view in self._between:
+            points = points_map[view.ids]
+            known = np.isfinite(points[:, 0])
+            fit = estimate_pose(
+                points[known],
+                view.pixels[known].astype(np.float64),
+                np.full(int(known.sum()), self._parameters.corner_sigma_px),
+                self._calibration.camera,
+                T_map_camera,
+            )
+            if fit.inliers.sum() >= self._parameters.min_points:
+                T_map_camera = fit.T_map_camera
+                placed.append((view.stamp_ns, T_map_camera))
+        return placed

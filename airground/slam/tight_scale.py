@@ -5,19 +5,34 @@ from __future__ import annotations
 import numpy as np
 
 from airground.slam.front_end import ScaleEstimate
-from airground.slam.inertial.alignment import InertialAlignment, VisualNoise, align, refine_scale
+from airground.slam.inertial.alignment import (
+    HOPELESS_SIGMA,
+    OBSERVABLE_SIGMA,
+    InertialAlignment,
+    VisualNoise,
+    align,
+    refine_scale,
+)
 from airground.slam.inertial.preintegration import Preintegration
 from airground.slam.keyframe_slam import KeyframeSlam
 
 MIN_KEYFRAMES = 6
-MIN_SECONDS = 1.5
-"""Least duration of a motion that shows the scale [s]."""
+MIN_SECONDS = 0.6
+"""Least duration of a motion that shows the scale [s]: a take-off does so in this time."""
 MAX_KEYFRAMES = 60
 """Number of newest keyframes that a scale is searched over."""
-GIVE_OUT_SIGMA = 0.02
-"""Poses are given out when the scale is known this well [share] ..."""
-GIVE_OUT_TILT = np.deg2rad(0.5)
-"""... and the vertical this well [rad] ..."""
+METRIC_SIGMA = 0.06
+"""A map becomes metric when its scale is known this well [share]. From then on inertial factors
+improve it."""
+GIVE_OUT_SIGMA = 0.03
+"""Poses of a metric map are given out when its scale is known this well [share] ..."""
+GIVE_OUT_S = 1.5
+"""... or after this duration of the map [s]. A take-off shows the scale sooner, and meanwhile
+doubles the robot's height every half second, so that a pose would be off by centimetres."""
+SETTLED_SIGMA = 0.02
+"""The scale counts as known from this standard deviation on [share] ..."""
+SETTLED_TILT = np.deg2rad(0.5)
+"""... and the vertical from this one on [rad] ..."""
 TILT_PATIENCE_S, PATIENT_TILT = 6.0, np.deg2rad(0.7)
 """... or, after so long [s], this well [rad]: in flight without turning, tilt cannot be separated
 from the bias of the accelerometer."""
@@ -30,19 +45,20 @@ POSE_SIGMA_PX = 0.3
 class TightScale:
     """Inertial factors in bundle adjustment hold the scale.
 
-    A map that began at rest is metric from the start, and only has to tell how well it knows
-    its scale. One that began in motion is scaled and turned upright once both are known.
+    A map begins with an unknown scale. It is scaled and turned upright once the motion shows the
+    scale to `METRIC_SIGMA`; from then on inertial factors improve both.
 
     Attributes:
         estimate: How well the scale is known; None before the first alignment.
-        known: Whether poses may be given out.
+        known: Whether poses may be given out: the map is metric and its scale known.
+        settled: Whether scale and vertical are known well.
         tilt_sigma: How well the vertical is known, per axis [rad].
     """
 
     def __init__(self, slam: KeyframeSlam) -> None:
         self.estimate: ScaleEstimate | None = None
         # Without an IMU the scale stays unknown: the unit is the scene's median depth.
-        self.known = slam.calibration.imu is None
+        self.known = self.settled = slam.calibration.imu is None
         self.tilt_sigma = UNKNOWN_TILT
         self._slam = slam
         self._judged = 0
@@ -50,28 +66,64 @@ class TightScale:
     def update(self, tracked: bool) -> bool:
         """Look at new keyframes, `tracked` or not; returns whether the map was moved."""
         slam = self._slam
-        count = slam.map.made
         if slam.motion.buffer is None:
             self.estimate = ScaleEstimate(np.inf, observable=False)
             return False
-        fresh = count > self._judged and (not self.known or count >= 1.5 * self._judged)
-        keyframes = slam.map.keyframes
-        seconds = (keyframes[-1].stamp_ns - keyframes[0].stamp_ns) * 1e-9
-        if not fresh or count < MIN_KEYFRAMES or seconds < MIN_SECONDS:
+        moved = self._judge()
+        if slam.metric and self.estimate is not None:
+            self.known |= self.estimate.sigma < GIVE_OUT_SIGMA or self._seconds() >= GIVE_OUT_S
+        return moved
+
+    def finish(self) -> None:
+        """After the last image: give a map that is not metric yet the likeliest unit, if any."""
+        if self._slam.metric or len(self._slam.map.keyframes) < MIN_KEYFRAMES:
+            return
+        alignment = self._alignment()
+        if alignment is not None and alignment.scale_sigma < HOPELESS_SIGMA:
+            self._learn(alignment)
+            self._slam.make_upright(alignment.scale, alignment.R_map_v)
+
+    def _judge(self) -> bool:
+        """Look at new keyframes; returns whether the map was moved."""
+        slam, count = self._slam, self._slam.map.made
+        fresh = count > self._judged and (not self.settled or count >= 1.5 * self._judged)
+        if not fresh or count < MIN_KEYFRAMES or self._seconds() < MIN_SECONDS:
             return False
         self._judged = count
         alignment = self._alignment()
         if alignment is None:
             return False
-        self.estimate = ScaleEstimate(alignment.scale_sigma, alignment.observable)
-        self.tilt_sigma = min(alignment.tilt_sigma, UNKNOWN_TILT)
-        tilt = PATIENT_TILT if seconds > TILT_PATIENCE_S else GIVE_OUT_TILT
-        ready = alignment.scale_sigma < GIVE_OUT_SIGMA and alignment.tilt_sigma < tilt
-        self.known = self.known or ready
-        if slam.inertial or not ready:
+        self._learn(alignment)
+        if slam.inertial:
+            return self._correct(alignment)
+        if not alignment.scale_sigma < METRIC_SIGMA:
             return False
         slam.make_inertial(alignment)
         return True
+
+    def _correct(self, alignment: InertialAlignment) -> bool:
+        """Adjust the whole map where its scale is off by more than chance: the window that follows
+        the robot keeps the scale of the keyframes that hold it. Returns whether it was."""
+        if not abs(np.log(alignment.scale)) > alignment.scale_sigma:
+            return False
+        self._slam.adjust_all()
+        return True
+
+    def _learn(self, alignment: InertialAlignment) -> None:
+        """Take over how well scale and vertical are known."""
+        sigma = alignment.scale_sigma
+        if self._slam.metric and self.estimate is not None:
+            # A metric map keeps its unit, whether newer motion shows it or not.
+            sigma = min(sigma, self.estimate.sigma)
+        self.estimate = ScaleEstimate(sigma, sigma < OBSERVABLE_SIGMA)
+        self.tilt_sigma = min(alignment.tilt_sigma, UNKNOWN_TILT)
+        tilt = PATIENT_TILT if self._seconds() > TILT_PATIENCE_S else SETTLED_TILT
+        self.settled |= sigma < SETTLED_SIGMA and self.tilt_sigma < tilt
+
+    def _seconds(self) -> float:
+        """Duration of the map [s]."""
+        keyframes = self._slam.map.keyframes
+        return (keyframes[-1].stamp_ns - keyframes[0].stamp_ns) * 1e-9
 
     def _alignment(self) -> InertialAlignment | None:
         """Scale and vertical by the newest keyframes with nothing missing between them."""

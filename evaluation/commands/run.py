@@ -171,10 +171,11 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
         print_summary(summary)
 
     def _run_own(self, mav: Path, ground: Path) -> None:
-        from evaluation.run.own_recordings import print_pair, run_pair, write_pair
+        from evaluation.run.own_pair import print_pair, run_pair, write_pair
         from evaluation.setup.output import fresh_folder
         from evaluation.setup.progress import announce
         from evaluation.setup.settings import write_config
+        from evaluation.show.report.pair_page import write_pair_page
 
         for word, needs in (("--drops", self.drops), ("--poses oracle", self.poses == "oracle")):
             if needs:
@@ -190,6 +191,7 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
                 result = run_pair(pair, setup, seed, onlookers)
             summary = write_pair(folder, pair, setup, result)
             write_config(setup.config, folder / "config.toml")
+            write_pair_page(folder, name, summary, result)
         print_pair(summary)
 
     def _setup_with(self, variant: str) -> Setup:

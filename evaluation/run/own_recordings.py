@@ -1,4 +1,4 @@
-"""Recordings of a user's own, of any known layout: one robot alone, or both robots.
+"""Recordings of a user's own, of any known layout: one robot alone.
 
 The truth is optional: errors are stated for the images whose true pose is known.
 """
@@ -7,40 +7,27 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from airground.augmentation import AugmentedMap
-from airground.core.cloud import Source
 from airground.core.messages import GroundImage, ImuSamples, MavImage
 from airground.core.trajectory import Trajectory
-from airground.errors import InputError
-from airground.io.ply import write_ply
-from airground.io.robot_recording import Pair, RobotRecording
-from airground.io.tum import write_tum
+from airground.io.robot_recording import RobotRecording
 from airground.slam.front_end import FrontEnd
-from evaluation.run.driver import drive, pipeline_for
-from evaluation.run.onlooker import Onlooker
-from evaluation.run.pair_events import PairEvents
-from evaluation.run.tracking import (
-    TrackingHere,
-    TrackingTask,
-    live_path,
-    localizer_rng,
-    write_paths,
-)
+from evaluation.run.tracking import live_path, write_paths
 from evaluation.setup.checked_json import number
 from evaluation.setup.progress import step
-from evaluation.setup.setups import Setup
 from evaluation.setup.text import TextTable, metres, percent, print_table, seconds
 from evaluation.table.tracked_share import TruePose, tracked_share_of
-from evaluation.table.tracking_log import FrontEndLog, Tracked, WatchedFrontEnd
+from evaluation.table.tracking_log import FrontEndLog, WatchedFrontEnd
 from evaluation.table.trajectory_error import trajectory_error
-from evaluation.table.true_camera import true_camera
+
+WELL_KNOWN_SCALE, LIKELY_SCALE = 0.02, 0.5
+"""Standard deviation of a scale up to which nothing is said of it, and from which on the poses are
+up to scale [share]: half is what the closed form needs to give a unit at all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,9 +62,12 @@ def run_alone(recording: RobotRecording, front_end: FrontEnd[Any]) -> AloneResul
     return AloneResult(watched.log(), watched.trajectory(), finish_ms)
 
 
-def why_untracked(recording: RobotRecording, log: FrontEndLog) -> str:
-    """One line on why no image of a recording was tracked; empty where one was."""
-    if not log.answers or log.live_poses():
+def why_untracked(
+    recording: RobotRecording, log: FrontEndLog, final: Trajectory | None = None
+) -> str:
+    """One line on why no image of a recording was tracked; empty where one was, or where there are
+    `final` poses."""
+    if not log.answers or log.live_poses() or final is not None:
         return ""
     waiting = log.waiting or "a first pose"
     return (
@@ -85,6 +75,20 @@ def why_untracked(recording: RobotRecording, log: FrontEndLog) -> str:
         f"of the {recording.robot.name.lower()} was tracked; the front end still waited for "
         f"{waiting}"
     )
+
+
+def scale_note(recording: RobotRecording, log: FrontEndLog, final: Trajectory | None) -> str:
+    """One line on poses whose scale is not known well; empty where it is, or where depth or a file
+    gives it."""
+    scales = [answer.scale for answer in log.answers if answer.scale is not None]
+    if final is None or not scales or scales[-1].sigma <= WELL_KNOWN_SCALE:
+        return ""
+    sigma = scales[-1].sigma
+    if sigma < LIKELY_SCALE:
+        return f"the scale of the poses is known to {sigma:.1%}"
+    if recording.calibration.imu is None:
+        return "poses are up to scale: there is no IMU"
+    return f"poses are up to scale: the front end still waited for {log.waiting}"
 
 
 def write_alone(
@@ -101,16 +105,16 @@ def write_alone(
         "version": 1,
         "robot": recording.robot.name.lower(),
         "front_end": front_end,
-        **_robot(folder, "trajectory", recording, result.log, result.final, true_pose),
+        **robot_summary(folder, "trajectory", recording, result.log, result.final, true_pose),
         "frame_ms": {
             "mean": float(durations_ms.mean()),
             "median": float(np.median(durations_ms)),
             "p95": float(np.percentile(durations_ms, 95)),
         },
         "finish_ms": result.finish_ms,
-        "why_untracked": why_untracked(recording, result.log) or None,
+        "why_untracked": why_untracked(recording, result.log, result.final) or None,
     }
-    _write_summary(folder, summary)
+    write_summary(folder, summary)
     return summary
 
 
@@ -122,6 +126,7 @@ def print_alone(summary: dict[str, Any]) -> None:
         ("tracked, from the first motion on", percent(summary["tracked_fraction"])),
         ("first pose after", seconds(summary["first_pose_s"])),
         ("lost after the first pose", str(summary["lost_images"])),
+        ("images with a final pose", str(summary["final_images"])),
         ("time a frame: mean, 95th percentile", f"{times['mean']:.1f}, {times['p95']:.1f} ms"),
     ]
     for name, error in summary["error"].items():
@@ -136,110 +141,15 @@ def print_alone(summary: dict[str, Any]) -> None:
             (f"{name} poses, scale error", f"{100 * error['scale_error']:+.2f} %"),
         ]
     title = f"{summary['robot']} alone, front end {summary['front_end']}"
-    caption = summary["why_untracked"] or (
-        "errors by evo, of the camera's position, after the alignment named"
+    caption = (
+        summary["why_untracked"]
+        or summary["scale_note"]
+        or ("errors by evo, of the camera's position, after the alignment named")
     )
     print_table(TextTable(("", "here"), tuple(rows)), title, caption, bold=(1,))
 
 
-@dataclass(frozen=True, eq=False)
-class PairResult:
-    """What a run over two recordings leaves; `tracked` has the answers by robot ("mav",
-    "ground")."""
-
-    tracked: dict[str, Tracked]
-    augmented: AugmentedMap
-    events: PairEvents
-
-
-def run_pair(pair: Pair, setup: Setup, seed: int, onlookers: Sequence[Onlooker] = ()) -> PairResult:
-    """Run the pipeline of Figure 4 from the first message to the last.
-
-    A recording of ours that was exported and is read as a pair gives the same result as itself.
-
-    Raises:
-        InputError: The setup takes the heading from magnetometers, and a robot has none; or no
-            image of a robot was tracked.
-    """
-    if setup.config.localization.heading != "search":
-        for recording in (pair.mav, pair.ground):
-            if recording.magnetic is None:
-                raise InputError(
-                    f"{recording.path}: has no magnetometer (mag0), so that the heading is "
-                    "unknown; give --heading search"
-                )
-    tracking = TrackingHere(TrackingTask(pair, None, setup, seed))
-    pipeline = pipeline_for(pair, setup, localizer_rng(seed, flight=0))
-    events = PairEvents()
-    driven = drive(pair, tracking, pipeline, setup, [events, *onlookers])
-    for robot, tracked in driven.tracked.items():
-        reason = why_untracked(pair.of(Source[robot.upper()]), tracked.front_end)
-        if reason:
-            raise InputError(reason)
-    return PairResult(driven.tracked, pipeline.augmented_map(), events)
-
-
-def write_pair(folder: Path, pair: Pair, setup: Setup, result: PairResult) -> dict[str, Any]:
-    """Write the map, the trajectories and `summary.json`; returns the summary.
-    Each robot leaves `ROBOT.tum` and `ROBOT_live.tum`; `T_ground_mav.tum` has the accepted
-    alignments by the stamps of their surfaces."""
-    augmented, events = result.augmented, result.events
-    write_ply(folder / "augmented_map.ply", augmented.cloud_ground, augmented.sources)
-    accepted = [alignment for alignment in events.alignments if alignment.accepted]
-    if accepted:
-        stamps_ns = [alignment.stamp_ns for alignment in accepted]
-        poses = [alignment.T_ground_mav for alignment in accepted]
-        write_tum(folder / "T_ground_mav.tum", Trajectory.from_poses(stamps_ns, poses))
-    robots = {}
-    for name, tracked in result.tracked.items():
-        recording, log = pair.of(Source[name.upper()]), tracked.front_end
-        robots[name] = _robot(folder, name, recording, log, tracked.final, true_camera(recording))
-        robots[name]["frame_ms_median"] = float(np.median(log.durations_ms))
-    summary = {
-        "schema": "airground-pair",
-        "version": 1,
-        "preset": setup.config.preset,
-        "replaced": setup.given.describe(),
-        "aerial_surfaces": events.surfaces,
-        "located": events.located,
-        "not_located": dict(events.not_located),
-        "alignments": len(events.alignments),
-        "accepted": len(accepted),
-        "refused": dict(events.refused),
-        "why": events.why(setup.config.fusion.min_depth_maps),
-        "map_points": {
-            robot.name.lower(): int((augmented.sources == robot).sum()) for robot in Source
-        },
-        "robots": robots,
-    }
-    _write_summary(folder, summary)
-    return summary
-
-
-def print_pair(summary: dict[str, Any]) -> None:
-    """Print the summary of both robots as a short table."""
-    rows = [
-        ("aerial surfaces", str(summary["aerial_surfaces"])),
-        ("located after", str(summary["located"])),
-        *((f"not located, {kind}", str(n)) for kind, n in summary["not_located"].items()),
-        ("alignments accepted", f"{summary['accepted']} of {summary['alignments']}"),
-        *((f"refused, {kind}", str(n)) for kind, n in summary["refused"].items()),
-    ]
-    for name, robot in summary["robots"].items():
-        error = robot["error"]["final"]
-        rows += [
-            (f"{name}: tracked", percent(robot["tracked_fraction"])),
-            (f"{name}: first pose after", seconds(robot["first_pose_s"])),
-        ]
-        for label, key in (("RMS after SE3", "ate_se3_rmse_m"), ("over 1 m", "rpe_1m_rmse_m")):
-            rms = "truth unknown" if error is None else metres(error[key])
-            rows.append((f"{name}: {label}", rms))
-    title = f"both robots, preset {summary['preset']}"
-    caption = "; ".join(filter(None, (summary["replaced"], summary["why"])))
-    print_table(TextTable(("", "here"), tuple(rows)), title, caption, bold=(1,))
-
-
-def _robot(
+def robot_summary(
     folder: Path,
     name: str,
     recording: RobotRecording,
@@ -258,6 +168,8 @@ def _robot(
         "tracked_fraction": share.fraction,
         "first_pose_s": number(share.first_pose_s),
         "lost_images": share.lost_images,
+        "final_images": 0 if final is None else len(final),
+        "scale_note": scale_note(recording, log, final) or None,
         "error": {"final": _error(true_pose, final), "live": _error(true_pose, live_path(log))},
     }
 
@@ -286,6 +198,7 @@ def _error(
     }
 
 
-def _write_summary(folder: Path, summary: dict[str, Any]) -> None:
+def write_summary(folder: Path, summary: dict[str, Any]) -> None:
+    """Write `summary.json`."""
     text = json.dumps(summary, indent=2) + "\n"
     (folder / "summary.json").write_text(text, encoding="utf-8")

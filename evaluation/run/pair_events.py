@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from airground.config import Config
 from airground.core.arrays import F64
 from airground.core.belief import Alignment
 from airground.core.events import (
@@ -31,6 +32,8 @@ class PairEvents:
         alignments: Every refinement, in order of time.
         refused: Numbers of refused alignments by the kind of reason.
         path_m: Length of the path of the MAV's camera [m].
+        scale_sigma: Least standard deviation of the MAV's scale [share]; None where poses state
+            none.
     """
 
     depth_maps: int = 0
@@ -40,13 +43,16 @@ class PairEvents:
     alignments: list[Alignment] = field(default_factory=list)
     refused: Counter[str] = field(default_factory=Counter)
     path_m: float = 0.0
+    scale_sigma: float | None = None
     _camera_mav: F64 | None = None
     _newest_reason: str = ""
 
     def see(self, seen: Seen) -> None:
         """Count one event."""
         match seen.event:
-            case MavTracked(T_mav_camera=pose):
+            case MavTracked(T_mav_camera=pose, scale_sigma=sigma):
+                if sigma is not None:
+                    self.scale_sigma = min(sigma, self.scale_sigma or np.inf)
                 if self._camera_mav is not None:
                     self.path_m += float(np.linalg.norm(pose.translation - self._camera_mav))
                 self._camera_mav = pose.translation
@@ -65,16 +71,23 @@ class PairEvents:
                 if not alignment.accepted:
                     self._add(self.refused, alignment.refusal)
 
-    def why(self, min_depth_maps: int) -> str | None:
-        """Why nothing was aligned, in words; None where something was.
-        `min_depth_maps` is the least number of depth maps that make a surface."""
+    def why(self, config: Config) -> str | None:
+        """Why nothing was aligned, in words; None where something was."""
         if any(alignment.accepted for alignment in self.alignments):
             return None
+        max_sigma = config.view_selection.max_scale_sigma
+        if self.scale_sigma is not None and self.scale_sigma > max_sigma:
+            known = f"known to {self.scale_sigma:.0%}"
+            return (
+                "no surface: the scale of the MAV's map is "
+                f"{known if np.isfinite(self.scale_sigma) else 'unknown'}, and depth maps need "
+                f"{max_sigma:.0%}"
+            )
         if self.surfaces == 0:
             return (
                 f"no surface: the MAV's camera moved {self.path_m:.2f} m while it was tracked, "
-                f"which gave {self.depth_maps} depth maps; a surface needs {min_depth_maps} near "
-                "each other"
+                f"which gave {self.depth_maps} depth maps; a surface needs "
+                f"{config.fusion.min_depth_maps} near each other"
             )
         return self._newest_reason or None
 

@@ -1,8 +1,8 @@
 """Settings that must precede the first heavy import: threads, memory and how to render.
 
-Policy: BLAS gets one thread, since the matrices here are small and its results would depend
-on the number. Loops of numba, OpenMP and OpenCV, whose results do not depend on how they are
-split, get one per core.
+Policy: BLAS gets one thread whatever is set, since the matrices here are small and its results
+would depend on the number. Loops of numba, OpenMP and OpenCV, whose results do not depend on how
+they are split, get one per core.
 """
 
 from __future__ import annotations
@@ -34,7 +34,8 @@ def usable_cores(quota_file: Path = CPU_QUOTA) -> int:
 
 
 def prepare(threads: int | None = None) -> int:
-    """Set the environment of this process and its children; variables that are set stay.
+    """Set the environment of this process and its children; variables that are set stay, except
+    those of BLAS.
 
     Args:
         threads: Number of threads, which replaces what is set; None for one per usable core.
@@ -48,8 +49,8 @@ def prepare(threads: int | None = None) -> int:
     if threads is not None and threads < 1:
         raise InputError(f"--threads {threads}: must be at least 1")
     count = threads or usable_cores()
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    os.environ.setdefault("MKL_NUM_THREADS", "1")
+    for name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"
     for name in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"):
         if threads is not None:
             os.environ[name] = str(count)

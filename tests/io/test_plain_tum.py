@@ -82,6 +82,32 @@ def test_the_published_calibration_is_chosen_by_name(tmp_path: Path, name: str, 
     assert camera.fx == pytest.approx(fx, rel=0.0 if name == "fr3" else 0.1)
 
 
+@pytest.mark.parametrize(("name", "known"), [("fr1_desk", True), ("fr3", False)])
+def test_a_kinect_takes_its_rows_one_after_the_other(
+    tmp_path: Path, name: str, known: bool
+) -> None:
+    calibration = ground(write_tum(tmp_path / name)).calibration
+    # Undistortion stretches the image: fewer rows of the camera fill it.
+    stretched = calibration.camera.fy / 516.5
+    assert calibration.readout_s == pytest.approx(0.02611 / stretched if known else 0.0)
+
+
+@pytest.mark.parametrize(
+    ("stated", "seconds"), [("0.02", 0.02), ("26.1", "is longer than 0.1 s"), ("-1", "positive")]
+)
+def test_a_calibration_states_the_readout_time(
+    folder: Path, stated: str, seconds: float | str
+) -> None:
+    text = "resolution: [640, 480]\nintrinsics: [525, 525, 319.5, 239.5]\n"
+    text += f"distortion_model: none\nreadout_s: {stated}\n"
+    (folder / "calibration.yaml").write_text(text)
+    if isinstance(seconds, float):
+        assert ground(folder).calibration.readout_s == seconds
+    else:
+        with pytest.raises(RecordingError, match=f"readout_s.*{seconds}"):
+            ground(folder)
+
+
 def test_or_by_a_comment_in_the_lists(folder: Path, tmp_path: Path) -> None:
     renamed = folder.rename(tmp_path / "head")
     with pytest.raises(RecordingError, match="calibration is missing"):

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from airground.core.se3 import SE3
-from airground.slam.frame_pose import BLUR, POSITION_SIGMA_M, frame_pose
+from airground.slam.frame_pose import BLUR, frame_pose
 from airground.slam.geometry.pose_estimation import PoseFit
+from airground.slam.motion_model import POSITION_SIGMA_M
 from tests.slam.views import CAMERA, down_at, observe, seen_points
 
 TRUE = down_at([0.4, -0.3, 2.2], (0.04, -0.03, 0.5))
@@ -41,7 +42,7 @@ def fit_of(
         predicted,
         sigma_px=SIGMA_PX,
         rotation_sigma=2e-3 if gyro else None,
-        inertial=inertial,
+        position_sigma=POSITION_SIGMA_M if inertial else None,
         min_points=15,
         rng=rng,
         inverse_depths=inverse if depth else None,

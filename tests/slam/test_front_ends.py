@@ -142,7 +142,8 @@ def test_the_trajectory_holds_each_tracked_image(name: str, black: bool) -> None
     stamps = [p.stamp_ns for p in result.tracked if p.tracking is Tracking.TRACKED]
     assert (result.trajectory is None) == (not stamps)
     if result.trajectory is not None:
-        assert result.trajectory.stamps_ns.tolist() == stamps
+        # Images before the first pose may have one by now.
+        assert result.trajectory.stamps_ns.tolist()[-len(stamps) :] == stamps
         R = result.trajectory.rotations
         np.testing.assert_allclose(
             R @ R.transpose(0, 2, 1), np.tile(np.eye(3), (len(R), 1, 1)), atol=1e-6

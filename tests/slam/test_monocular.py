@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from evo.core.geometry import umeyama_alignment
 
 from airground.config import Config, paper
 from airground.slam.front_end import Tracking
@@ -43,3 +45,26 @@ def test_a_map_given_up_takes_all_that_was_known_of_its_unit_along(config: Confi
     assert not front_end._slam.inertial
     assert not front_end._scale.known
     assert front_end._scale.estimate is None
+
+
+def test_a_short_clip_gives_final_poses_back_to_its_first_image() -> None:
+    """Too short for live poses, it leaves those of all images, after `finish` and not before."""
+    sequence = mav_sequence(frames=96, rate_hz=20.0)
+    clip = replace(sequence, images=sequence.images[20:60])
+    front_end = MonocularSlam(sequence.calibration, Config(), np.random.default_rng(0))
+    previous = clip.images[0].stamp_ns - 10**7
+    for image in clip.images:
+        front_end.add_imu(sequence.imu.between(previous, image.stamp_ns))
+        answer = front_end.track(image)
+        previous = image.stamp_ns
+        assert answer.tracking is Tracking.INITIALIZING
+        assert front_end.trajectory() is None
+    front_end.finish()
+    path = front_end.trajectory()
+    assert path is not None
+    assert path.stamps_ns.tolist() == [image.stamp_ns for image in clip.images]
+    true = np.array([sequence.T_world_camera.at(int(t)).translation for t in path.stamps_ns])
+    _, _, scale = umeyama_alignment(path.translations.T, true.T, with_scale=True)
+    turn, shift, _ = umeyama_alignment(scale * path.translations.T, true.T)
+    off = turn @ (scale * path.translations.T) + shift[:, None] - true.T
+    assert np.sqrt((off**2).sum(axis=0).mean()) < 0.01

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from airground.core.messages import ImuSamples
+from airground.core.se3 import SE3
 from airground.slam import so3
 from airground.slam.motion_model import ROTATION_SIGMA, MotionModel
 from airground.slam.rig_state import RigState
@@ -139,3 +140,18 @@ def test_a_measured_pose_brings_its_velocity_unless_inertia_knows_better() -> No
     for state in (by_inertia, by_the_way, after_a_blind_image):
         np.testing.assert_array_equal(state.position, there.position)
         np.testing.assert_allclose(state.rotation, there.rotation, atol=1e-12)
+
+
+def test_a_hand_held_camera_is_expected_near_where_its_last_steps_lead() -> None:
+    start, end = (int(stamp) for stamp in to_ns(np.array([START_S, END_S])))
+    before = truth(START_S)
+    motion = model(None)
+    lost = motion.predict(before, TURN, start, end, False, False)
+    known = motion.predict(before, TURN, start, end, False, True)
+    assert lost.position_sigma is None
+    assert known.position_sigma is not None
+    assert known.position_sigma < 0.03
+    # A step that was measured wrong counts half.
+    there = SE3(before.rotation, before.position + 0.1 * before.velocity + [0.02, 0.0, 0.0])
+    after = motion.measured(before, known, there, 0.1)
+    np.testing.assert_allclose(after.velocity - before.velocity, [0.1, 0.0, 0.0], atol=1e-9)

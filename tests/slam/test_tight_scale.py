@@ -9,8 +9,9 @@ import pytest
 
 from airground.config import Config
 from airground.slam.front_end import Tracking
+from airground.slam.inertial.alignment import OBSERVABLE_SIGMA
 from airground.slam.monocular import MonocularSlam
-from airground.slam.tight_scale import GIVE_OUT_SIGMA, TightScale
+from airground.slam.tight_scale import TightScale
 from tests.slam.driven_slam import DrivenSlam
 from tests.slam.inertial_keyframes import even
 from tests.slam.inertial_motion import Motion, lively
@@ -36,7 +37,7 @@ def test_scale_is_right_within_what_it_says(seed: int) -> None:
     assert index is not None
     assert scale.estimate is not None
     assert scale.estimate.observable
-    assert scale.estimate.sigma < GIVE_OUT_SIGMA
+    assert scale.estimate.sigma < OBSERVABLE_SIGMA
     assert abs(driven.scale_error()) < 3.5 * scale.estimate.sigma
     assert driven.tilt() < np.deg2rad(1.0)
     assert driven.slam.metric

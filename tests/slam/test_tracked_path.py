@@ -95,3 +95,28 @@ def test_images_follow_a_map_that_grows() -> None:
     after = poses(path, keyframes)
     np.testing.assert_allclose(after[:, :3, 3], 2.5 * before[:, :3, 3], atol=1e-12)
     np.testing.assert_allclose(after[:, :3, :3], before[:, :3, :3], atol=1e-12)
+
+
+def test_what_adjustment_changed_is_spread_over_the_images_between_keyframes() -> None:
+    rng = np.random.default_rng(3)
+    path = TrackedPath()
+    keyframes = [some_keyframe(0, rng)]
+    start = keyframes[0].state.pose()
+    step = SE3.from_rotation_vector([0.0, 0.0, 0.02], [0.01, 0.0, 0.0])
+    tracked = [start]
+    for _ in range(IMAGES_EACH):
+        tracked.append(tracked[-1] @ step)
+    for n in range(IMAGES_EACH):
+        path.note(n, tracked[n], keyframes)
+    path.lead(IMAGES_EACH, tracked[IMAGES_EACH], keyframes)
+    second = some_keyframe(IMAGES_EACH, rng)
+    # Adjusted, the second keyframe is 4 cm from where it was tracked.
+    moved = tracked[IMAGES_EACH] @ SE3.from_rotation_vector([0, 0, 0], [0.0, 0.04, 0.0])
+    second.state = second.state.posed(moved)
+    keyframes.append(second)
+    path.note(IMAGES_EACH, moved, keyframes)
+    found = poses(path, keyframes)
+    np.testing.assert_allclose(found[0], start.matrix(), atol=1e-12)
+    np.testing.assert_allclose(found[-1], moved.matrix(), atol=1e-12)
+    steps = np.linalg.norm(np.diff(found[:, :3, 3], axis=0), axis=1)
+    assert steps.max() < 0.016  # not 4 cm at once

@@ -78,6 +78,7 @@ def open_bag(
             imu.T_imu_camera,
             level_body(imu.up_imu, imu.T_imu_camera),
             imu.noise,
+            readout_s=undistortion.readout_s,
         ),
         camera_stamps=frames.stamps_ns,
         imu=imu.samples,

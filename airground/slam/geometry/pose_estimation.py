@@ -61,6 +61,7 @@ def estimate_pose(
     inverse_depth_sigmas: F64 | None = None,
     rotation_sigma: float | None = None,
     position_sigma: float | None = None,
+    T_map_camera_prior: SE3 | None = None,
     huber: float = 1.5,
 ) -> PoseFit:
     """Fit a pose to pixels, depths and priors: first all with Huber's cost, then the inliers.
@@ -72,11 +73,12 @@ def estimate_pose(
         points_map: (N, 3) points in the map [m].
         pixels: (N, 2) pixels of the points in the image.
         sigmas_px: (N,) standard deviation of the pixels per axis [px].
-        T_map_camera_start: First guess, and the mean of the priors.
+        T_map_camera_start: First guess.
         inverse_depths: (N,) measured inverse depths [1/m], NaN without one; None without any.
         inverse_depth_sigmas: (N,) standard deviation of the inverse depths [1/m].
-        rotation_sigma: Standard deviation of the start's rotation per axis [rad]; None if unknown.
-        position_sigma: Standard deviation of the start's position per axis [m]; None if unknown.
+        rotation_sigma: Standard deviation of the prior's rotation per axis [rad]; None if unknown.
+        position_sigma: Standard deviation of the prior's position per axis [m]; None if unknown.
+        T_map_camera_prior: Mean of the priors; None for the first guess.
         huber: Number of sigmas above which residuals count linearly.
 
     Raises:
@@ -95,11 +97,14 @@ def estimate_pose(
     prior_weights = np.array(
         [0.0 if s is None else 1.0 / s**2 for s in (position_sigma, rotation_sigma)]
     )
+    prior = T_map_camera_start if T_map_camera_prior is None else T_map_camera_prior
     rotation, position, inliers, rms_px, covariance, iterations = _fit(
         observed,
         np.array([camera.fx, camera.fy, camera.cx, camera.cy]),
         np.array(T_map_camera_start.rotation),
         np.array(T_map_camera_start.translation),
+        np.array(prior.rotation),
+        np.array(prior.translation),
         prior_weights,
         huber,
     )
@@ -109,12 +114,12 @@ def estimate_pose(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _fit(
-    observed: F64, k: F64, R0: F64, p0: F64, prior: F64, huber: float
+    observed: F64, k: F64, R: F64, p: F64, R0: F64, p0: F64, prior: F64, huber: float
 ) -> tuple[F64, F64, Mask, float, F64, int]:
     n = len(observed)
     use_pixel, use_depth = np.ones(n, np.bool_), np.isfinite(observed[:, 6])
     R, p, steps = _descend(
-        observed, k, R0, p0, R0, p0, prior, huber, use_pixel, use_depth, ROBUST_ITERATIONS
+        observed, k, R, p, R0, p0, prior, huber, use_pixel, use_depth, ROBUST_ITERATIONS
     )
     _classify(observed, k, R, p, use_pixel, use_depth)
     R, p, more = _descend(

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from airground.config import Config
 from airground.core.belief import Alignment, Belief
 from airground.core.events import Aligned, BeliefUpdated, Event, MavTracked, NotLocated, SurfaceCast
 from airground.core.se3 import SE3
@@ -63,21 +64,31 @@ def test_reasons_are_counted_by_kind_and_the_newest_is_given() -> None:
         "no overlap": 2,
         "particles split": 1,
     }
-    assert found.why(3) == REFUSALS[-1]
+    assert found.why(Config()) == REFUSALS[-1]
 
 
 def test_an_accepted_alignment_needs_no_reason() -> None:
     found = counted(surface(), refused(REFUSALS[0]), BeliefUpdated(0, BELIEF), aligned(False))
     assert (found.located, found.refused) == (1, {"clouds disagree": 1})
-    assert found.why(3) == "clouds disagree: 10% of the aerial points"
+    assert found.why(Config()) == "clouds disagree: 10% of the aerial points"
     found = counted(surface(), BeliefUpdated(0, BELIEF), aligned(False), aligned(True))
-    assert found.why(3) is None
+    assert found.why(Config()) is None
 
 
 def test_without_a_surface_the_path_is_stated() -> None:
     poses = [SE3(np.eye(3), np.array([0.03 * k, 0.0, 2.0])) for k in range(5)]
     found = counted(*(MavTracked(k, pose) for k, pose in enumerate(poses)))
-    assert found.why(3) == (
+    assert found.why(Config()) == (
         "no surface: the MAV's camera moved 0.12 m while it was tracked, which gave 0 depth maps; "
         "a surface needs 3 near each other"
     )
+
+
+def test_a_scale_that_depth_maps_cannot_use_is_stated() -> None:
+    pose = SE3(np.eye(3), np.array([0.0, 0.0, 2.0]))
+    found = counted(*(MavTracked(k, pose, scale_sigma=0.1 / k) for k in range(1, 4)))
+    expected = "no surface: the scale of the MAV's map is known to 3%, and depth maps need 2%"
+    assert found.why(Config()) == expected
+    found = counted(MavTracked(0, pose, scale_sigma=np.inf))
+    expected = "no surface: the scale of the MAV's map is unknown, and depth maps need 2%"
+    assert found.why(Config()) == expected

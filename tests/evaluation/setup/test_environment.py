@@ -73,10 +73,11 @@ def test_what_is_there_to_stay_is_looked_through_once() -> None:
 
 def test_threads_are_set_for_every_library(monkeypatch: pytest.MonkeyPatch) -> None:
     names = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
-    environment = {"OMP_NUM_THREADS": "7"}
+    environment = {"OMP_NUM_THREADS": "7", "OPENBLAS_NUM_THREADS": "7"}
     monkeypatch.setattr("os.environ", environment)
     prepare()
     assert environment["OMP_NUM_THREADS"] == "7"
+    assert environment["OPENBLAS_NUM_THREADS"] == "1"
     prepare(threads=3)
     assert [environment[name] for name in names] == ["3", "3", "3"]
     assert environment["OPENBLAS_NUM_THREADS"] == "1"

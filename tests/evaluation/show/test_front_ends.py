@@ -42,7 +42,7 @@ def test_slam_keeps_a_real_turning_kinect_and_beats_open3d_frame_to_frame() -> N
     assert ours is not None
     assert theirs is not None
     assert ours.tracked == 1.0
-    assert ours.rms_cm < 8
+    assert ours.rms_cm < 4
     assert ours.rms_cm < 0.5 * theirs.rms_cm
 
 
