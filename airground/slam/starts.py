@@ -7,6 +7,7 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.linalg import norm
 
 from airground.config import KeyframeSlam
 from airground.core.arrays import F32, F64, I64
@@ -47,14 +48,18 @@ MAX_OFF_GRAVITY = 0.5
 """Specific force may differ this much from gravity for its direction to be upwards [m/s^2]."""
 
 
-def level_start(motion: MotionModel, calibration: RobotCalibration, stamp_ns: int) -> RigState:
+def level_start(
+    motion: MotionModel, calibration: RobotCalibration, stamp_ns: int, flying: bool = False
+) -> RigState:
     """The state in which a map begins: camera in the origin, its x axis along the map's. Up is by
-    the accelerometer; without one, the body is taken to stand level."""
+    the accelerometer; without one, or where a push hides gravity from one on the ground, the body
+    is taken to stand level."""
     up = calibration.T_body_imu.rotation.T[:, 2]
     if motion.buffer is not None:
         now = motion.imu_time(stamp_ns)
         means = motion.buffer.mean_between(now - LEVEL_WINDOW_NS, now)
-        if means is not None and abs(np.linalg.norm(means[1]) - GRAVITY) < MAX_OFF_GRAVITY:
+        # Rotors push along the body's own axis; the map is turned upright later.
+        if means is not None and (flying or abs(norm(means[1]) - GRAVITY) < MAX_OFF_GRAVITY):
             up = means[1]
     rotation = gravity_aligned(up, calibration.T_imu_camera.rotation[:, 0])
     return _centred(RigState.at_origin(rotation), calibration)
@@ -259,7 +264,7 @@ class TwoViewWait:
         motion: MotionModel,
     ) -> MovingStart:
         assert start.T_a_b is not None
-        state = level_start(motion, self._calibration, first.stamp_ns)
+        state = level_start(motion, self._calibration, first.stamp_ns, flying=True)
         T_rig_camera = self._calibration.T_imu_camera
         T_map_first = state.pose() @ T_rig_camera
         T_map_second = T_map_first @ start.T_a_b @ T_rig_camera.inverse()

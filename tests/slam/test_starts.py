@@ -115,6 +115,16 @@ def test_pushed_or_without_an_accelerometer_the_body_stands_level(pushed: list[f
         assert_camera_in_origin(state)
 
 
+@pytest.mark.parametrize("pushed", [[0, 0, 0.7], [0, 0, -1.0], [0, 0, 4.0]])
+def test_in_flight_up_is_where_the_accelerometer_says_however_hard_it_is_pushed(
+    pushed: list[float],
+) -> None:
+    """What a recording states of its body does not change the map."""
+    model = motion_of(TILT.T @ np.add([0, 0, GRAVITY], pushed), np.zeros(3))
+    state = level_start(model, CALIBRATION, 10**9, flying=True)
+    np.testing.assert_allclose(up_of(state), TILT[2], atol=1e-12)
+
+
 def left_after(start: RestStart, model: MotionModel, until_s: float) -> int | None:
     """Feed images at 30 Hz from when the window is full; after which of them the rest ended."""
     for index in range(int(REST_WINDOW_NS * 3e-8), round(until_s * 30)):
