@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import pytest
 
 from airground.config import Config, GroundMapping
 from airground.core.camera import PinholeCamera
@@ -27,6 +28,7 @@ from airground.core.messages import (
 )
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
+from airground.dense.reconstruction import DenseReconstruction
 from airground.ground_map import GroundMap
 from airground.pipeline import Mapping
 from airground.slam.front_end import ScaleEstimate, TrackedPose, Tracking
@@ -63,15 +65,11 @@ def at(x: float) -> SE3:
     return SE3.from_heading(0.0, [x, 0.0, 0.0])
 
 
-def tracked(stamp_ns: int, x: float, corrected: bool = False) -> TrackedPose:
-    return TrackedPose(
-        stamp_ns,
-        Tracking.TRACKED,
-        at(x),
-        COVARIANCE,
-        ScaleEstimate(0.004, True),
-        corrected=corrected,
-    )
+def tracked(
+    stamp_ns: int, x: float, corrected: bool = False, scale_sigma: float = 0.004
+) -> TrackedPose:
+    scale = ScaleEstimate(scale_sigma, True)
+    return TrackedPose(stamp_ns, Tracking.TRACKED, at(x), COVARIANCE, scale, corrected=corrected)
 
 
 def unposed(stamp_ns: int, tracking: Tracking) -> TrackedPose:
@@ -120,6 +118,31 @@ def test_initializing_is_not_lost() -> None:
     assert pose.covariance is not None
     assert pose.covariance.tobytes() == COVARIANCE.tobytes()
     assert pose.scale_sigma == 0.004
+
+
+def test_the_dense_stage_waits_until_the_scale_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A scale that was known stays with its map, and goes with it."""
+    limit = CONFIG.view_selection.max_scale_sigma
+    answers = [
+        tracked(0, 0.0, scale_sigma=1.5 * limit),
+        tracked(1, 0.1, scale_sigma=limit),
+        tracked(2, 0.2, scale_sigma=1.5 * limit),
+        unposed(3, Tracking.LOST),
+        tracked(4, 0.3, scale_sigma=np.inf),
+        unposed(5, Tracking.INITIALIZING),
+        tracked(6, 0.4, scale_sigma=1.5 * limit),
+    ]
+    given: list[int] = []
+
+    def add(_: DenseReconstruction, stamp_ns: int, *_args: object) -> list[Event]:
+        given.append(stamp_ns)
+        return []
+
+    monkeypatch.setattr(DenseReconstruction, "add", add)
+    made = Fed(Scripted(answers), Scripted([]))
+    events = [event for stamp in range(7) for event in made.add(mav_image(stamp))]
+    assert kinds(events).count(MavTracked) == 5
+    assert given == [1, 2, 4]
 
 
 def test_the_ground_map_follows_corrected_poses() -> None:

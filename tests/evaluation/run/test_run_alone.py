@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,17 @@ import numpy as np
 import pytest
 from evo.tools import file_interface
 
+from airground.core.cloud import Source
+from airground.core.se3 import SE3
+from airground.core.trajectory import Trajectory
 from airground.errors import RecordingError
+from airground.io.open_recording import open_robot
 from airground.io.tum import read_tum, write_tum
+from airground.slam.front_end import ScaleEstimate, TrackedPose, Tracking
 from evaluation import cli
+from evaluation.run.own_recordings import WELL_KNOWN_SCALE, scale_note
 from evaluation.setup import console
+from evaluation.table.tracking_log import FrontEndLog
 from evaluation.table.true_camera import read_euroc_poses
 from tests.evaluation.plain_recordings import write_euroc_folder, write_tum_folder
 from tests.slam.synthetic_world import ground_sequence, mav_sequence
@@ -161,3 +169,28 @@ def test_a_quaternion_that_is_not_of_unit_length_is_named(
     words = ("track", tum, "--trajectory", poses)
     assert airground(*words, "--out", tmp_path / "out") == console.EXIT_ERROR
     assert "poses.tum:1: the quaternion (qx qy qz qw) must have length 1" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("sigmas", "imu", "expected"),
+    [
+        ([None], True, ""),  # depth gives the scale
+        ([0.2, WELL_KNOWN_SCALE], True, ""),
+        ([0.2, 0.034], True, "the scale of the poses is known to 3.4%"),
+        ([0.034, np.inf], True, "poses are up to scale: the front end still waited for a climb"),
+        ([np.inf], False, "poses are up to scale: there is no IMU"),
+    ],
+)
+def test_what_is_said_of_the_scale(
+    sigmas: list[float | None], imu: bool, expected: str, euroc: Path
+) -> None:
+    recording = open_robot(euroc, Source.MAV)
+    if not imu:
+        recording = replace(recording, calibration=replace(recording.calibration, imu=None))
+    log = FrontEndLog(waiting="a climb")
+    for stamp, sigma in enumerate(sigmas):
+        scale = None if sigma is None else ScaleEstimate(sigma, sigma < 0.1)
+        log.answers.append(TrackedPose(stamp, Tracking.TRACKED, SE3.identity(), scale=scale))
+    final = Trajectory.from_poses([0], [SE3.identity()])
+    assert scale_note(recording, log, final) == expected
+    assert scale_note(recording, log, None) == ""
