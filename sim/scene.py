@@ -64,6 +64,8 @@ class Rubble(Part):
     """Share of the boxes that carry print, labels and stickers; the others are plain board."""
     size_scale: Annotated[float, Field(ge=0.1, le=1.5)] = 1.0
     """Every box is so many times as large as drawn; so the heap is about so much higher."""
+    changed: Annotated[float, Field(ge=0, le=0.5)] = 0.0
+    """Share of the boxes that have moved, fallen or gone when the MAV sees them."""
 
     @model_validator(mode="after")
     def _edges_in_order(self) -> Rubble:

@@ -51,7 +51,7 @@ def write_euroc_folder(folder: Path, simulated: Simulated, robots: tuple[Robot, 
     surface = folder / "mav0" / "pointcloud0"
     surface.mkdir()
     _write_yaml(surface / "sensor.yaml", sensor_yaml("pointcloud", SE3.identity(), {}))
-    write_ply(surface / "data.ply", sample_surface(simulated.truth, SURFACE_POINTS))
+    write_ply(surface / "data.ply", sample_surface(simulated.truth.surface("mav"), SURFACE_POINTS))
 
 
 def true_imu(simulated: Simulated, robot: Robot) -> tuple[Trajectory, NDArray[np.float64]]:

@@ -84,19 +84,19 @@ def render_truth(
         InputError: One of the folders exists.
         RecordingError: The truth lacks what is needed.
     """
-    instances = instances_of(simulated.truth) if "segmentation" in wanted.modalities else None
+    segmented = wanted.robots if "segmentation" in wanted.modalities else ()
+    instances = {robot: instances_of(simulated.truth, robot) for robot in segmented}
     with ExitStack() as stack, ThreadPoolExecutor(workers) as pool:
         folders = {
             (robot, name): stack.enter_context(fresh_folder(out / f"{robot}_{name}"))
             for robot in wanted.robots
             for name in wanted.modalities
         }
-        if instances is not None:
-            for robot in wanted.robots:
-                _write_table(folders[robot, "segmentation"] / "instances.csv", instances)
+        for robot in segmented:
+            _write_table(folders[robot, "segmentation"] / "instances.csv", instances[robot])
         written: Iterator[None] = iter(())
         for robot, index in _chosen(simulated, wanted):
-            files = _files(simulated, wanted, instances, robot, index)
+            files = _files(simulated, wanted, instances.get(robot), robot, index)
             list(written)  # the image before is encoded while the rays of this one are cast
             places = [(folders[robot, file.modality], file) for file in files]
             written = pool.map(_write, *zip(*places, strict=True))

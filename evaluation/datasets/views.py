@@ -14,7 +14,7 @@ from airground.core.cloud import PointCloud
 from airground.core.messages import GroundImage
 from airground.core.se3 import SE3
 from evaluation.datasets.simulated import Simulated
-from sim.recording.truth import Truth
+from sim.recording.true_surface import TrueSurface
 from sim.robots.motion import Robot
 
 EVERY = 10
@@ -24,6 +24,8 @@ PIXEL_CENTRE = 0.5
 """Centre of the upper left pixel in COLMAP and Nerfstudio [px]."""
 GREY = 128
 """Colour of points that no image shows."""
+ON_SURFACE_M = 1e-4
+"""Distance below which a point is on a surface: ten times the error of float32 [m]."""
 NEAR = 1e-3
 """A ray that ends this share of its length before a point hit the point's own surface."""
 
@@ -68,16 +70,19 @@ class Views:
 def choose_views(simulated: Simulated, robots: tuple[Robot, ...]) -> Views:
     """Every tenth image of each robot."""
     truth = simulated.truth
-    surface = sample_surface(truth, POINTS)
-    points = surface.points.astype(np.float64)
-    colours = surface.colours.copy()
+    sampled = truth.surface(robots[-1])
+    cloud = sample_surface(sampled, POINTS)
+    points = cloud.points.astype(np.float64)
+    colours = cloud.colours.copy()
     coloured = np.zeros(len(points), bool)
     views = []
     for robot in robots:
-        camera = truth.camera(robot)
+        camera, surface = truth.camera(robot), truth.surface(robot)
+        # In a world that changes, a robot may see no surface at a point of the other's.
+        there = surface is sampled or surface.distance(points) < ON_SURFACE_M
         for index, stamp_ns in list(enumerate(simulated.stamps_ns(robot)))[::EVERY]:
             T_world_camera = truth.T_world_camera(robot, stamp_ns)
-            seen = _seen_by(truth, camera, T_world_camera, points)
+            seen = _seen_by(surface, camera, T_world_camera, points, there)
             new = ~coloured[seen.indices]
             if new.any():
                 image = simulated.sensed(robot).read_image(index)
@@ -86,12 +91,12 @@ def choose_views(simulated: Simulated, robots: tuple[Robot, ...]) -> Views:
                 coloured[seen.indices] = True
             file = simulated.image_files(robot)[index]
             views.append(View(robot, index, file, T_world_camera, seen))
-    return Views(views, PointCloud(surface.points, colours))
+    return Views(views, PointCloud(cloud.points, colours))
 
 
-def sample_surface(truth: Truth, count: int) -> PointCloud:
-    """Points spread evenly over the true surface, in the world; the same in every call."""
-    mesh = o3d.io.read_triangle_mesh(truth.folder / "surface.ply")
+def sample_surface(surface: TrueSurface, count: int) -> PointCloud:
+    """Points spread evenly over a true surface, in the world; the same in every call."""
+    mesh = surface.mesh
     corners = np.asarray(mesh.vertices)[np.asarray(mesh.triangles)]
     areas = np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
@@ -107,18 +112,22 @@ def sample_surface(truth: Truth, count: int) -> PointCloud:
 
 
 def _seen_by(
-    truth: Truth, camera: PinholeCamera, T_world_camera: SE3, points_world: NDArray
+    surface: TrueSurface,
+    camera: PinholeCamera,
+    T_world_camera: SE3,
+    points_world: NDArray,
+    there: NDArray[np.bool_] | bool,
 ) -> Seen:
-    """The points (N, 3) of the surface that lie in the image and are not hidden."""
+    """The points (N, 3) that are there, lie in the image and are not hidden by the surface."""
     pixels = camera.project(T_world_camera.inverse() @ points_world)
     x, y = pixels.T
     with np.errstate(invalid="ignore"):
         inside = (x > -0.5) & (x < camera.width - 0.5) & (y > -0.5) & (y < camera.height - 0.5)
-    indices = np.flatnonzero(inside)
+    indices = np.flatnonzero(inside & there)
     origin = T_world_camera.translation
     rays = np.empty((len(indices), 6), np.float32)
     rays[:, :3], rays[:, 3:] = origin, points_world[indices] - origin
-    hits = truth.surface.cast_rays(o3d.core.Tensor.from_numpy(rays))["t_hit"].numpy()
+    hits = surface.scene.cast_rays(o3d.core.Tensor.from_numpy(rays))["t_hit"].numpy()
     clear = hits >= 1 - NEAR
     return Seen(indices[clear], pixels[indices[clear]])
 

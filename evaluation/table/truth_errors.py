@@ -110,7 +110,7 @@ class SurfaceError:
 def surface_error(
     depth: NDArray[np.float32], camera: PinholeCamera, T_world_camera: SE3, truth: Truth
 ) -> SurfaceError:
-    """Compare a depth map with the truth, point by nearest point.
+    """Compare a depth map of the MAV with the surface that it saw, point by nearest point.
 
     Args:
         depth: (height, width) [m], NaN where missing.
@@ -124,7 +124,7 @@ def surface_error(
     if not seen.any():
         return SurfaceError(error, np.nan, np.nan, 0.0)
     points_camera = camera.back_project(depth.astype(np.float64))[seen]
-    error[seen] = np.abs(truth.distance_to_surface(T_world_camera @ points_camera))
+    error[seen] = np.abs(truth.surface("mav").distance(T_world_camera @ points_camera))
     return SurfaceError(
         error,
         float(np.median(error[seen])),
@@ -137,4 +137,5 @@ def depth_error(
     depth: NDArray[np.float32], camera: PinholeCamera, stamp_ns: int, truth: Truth
 ) -> NDArray[np.float32]:
     """(height, width) depth minus true depth [m] of the MAV's view, NaN where one is missing."""
-    return (depth - truth.cast(camera, truth.T_world_mav_camera(stamp_ns))).astype(np.float32)
+    true = truth.surface("mav").cast(camera, truth.T_world_mav_camera(stamp_ns))
+    return (depth - true).astype(np.float32)

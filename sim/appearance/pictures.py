@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import mujoco
@@ -13,7 +14,7 @@ from airground.core.se3 import SE3
 from sim.appearance.bake_light import LightBaker
 from sim.appearance.cardboard import FaceKind, Make, paint_face
 from sim.appearance.sheet import faded, light_up
-from sim.geometry.rubble import Box
+from sim.geometry.box import Box
 
 # What a cube texture shows on each face of a box, in MuJoCo's order: outward normal, and the
 # box axes along which columns and rows grow (OpenGL's convention; a rendered test pins it).
@@ -51,11 +52,17 @@ def paint_boxes(
     texture: float,
     printed: float,
     baker: LightBaker,
-    rng: np.random.Generator,
+    rngs: Sequence[np.random.Generator],
 ) -> list[NDArray[np.uint8]]:
     """The lit cube picture (6 side, side, 3) of every box.
 
-    `texture` is its contrast, and `printed` the share of boxes with print.
+    Args:
+        boxes: Boxes where they lie.
+        makes: What boxes of each make share.
+        texture: Contrast of the pictures, 1 as drawn.
+        printed: Share of boxes with print.
+        baker: Light on the pictures.
+        rngs: Source of the features of each box alone.
     """
     if not boxes:
         return []
@@ -63,7 +70,7 @@ def paint_boxes(
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
         jobs = [
             pool.submit(_cube_picture, box, makes[box.make], texture, printed, light[i], own)
-            for i, (box, own) in enumerate(zip(boxes, rng.spawn(len(boxes)), strict=True))
+            for i, (box, own) in enumerate(zip(boxes, rngs, strict=True))
         ]
         return [job.result() for job in jobs]
 

@@ -83,13 +83,18 @@ class Instances:
     of_triangle: NDArray[np.uint16]
 
     @classmethod
-    def of(cls, parts: Sequence[Part]) -> Instances:
+    def of(cls, parts: Sequence[Part], others: Sequence[Part] = ()) -> Instances:
         """The things of a mesh.
+
+        Args:
+            parts: Parts of the mesh.
+            others: Parts of another mesh, whose things have the first ids: so that things of one
+                name have the same id in both.
 
         Raises:
             ValueError: There are more than 65535 things.
         """
-        kinds = {part.name: part.kind for part in parts}
+        kinds = {part.name: part.kind for part in (*others, *parts)}
         if len(kinds) > np.iinfo(np.uint16).max:
             raise ValueError(f"{len(kinds)} things do not fit 16-bit ids")
         ids = {name: index for index, name in enumerate(kinds, start=1)}

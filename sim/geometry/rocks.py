@@ -10,7 +10,7 @@ from scipy.ndimage import map_coordinates
 from scipy.spatial.transform import Rotation
 
 from airground.core.arrays import read_only
-from sim.geometry.rubble import lane_points
+from sim.geometry.lane import lane_points
 from sim.geometry.surface import Mesh
 from sim.geometry.terrain import HeightField
 from sim.scene import Scene

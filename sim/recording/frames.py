@@ -35,20 +35,28 @@ PNG_SETTINGS = [
 _PNG_MAX = 65535
 
 
+@dataclass(frozen=True)
+class WorldFiles:
+    """Files of a compiled world with both cameras, and of its edges."""
+
+    model: Path
+    edges: Path
+
+
 @dataclass(frozen=True, eq=False)
 class FramePlan:
     """All that a process needs to make frames.
 
     Attributes:
         recording: Folder that images are written into.
-        model, edges, motion: Files of the compiled world with both cameras, its edges, the motion.
+        worlds: What each robot sees.
+        motion: File of the motion.
         true: True calibration of the sensors.
         stamps_ns: Nominal stamps of each robot's images [ns].
     """
 
     recording: Path
-    model: Path
-    edges: Path
+    worlds: dict[Robot, WorldFiles]
     motion: Path
     true: CalibrationTable
     preset: SensorPreset
@@ -71,8 +79,11 @@ class FrameMaker:
     def __init__(self, plan: FramePlan) -> None:
         self._plan = plan
         self._motion = Motion.load(plan.motion)
-        self._edges = Edges.load(plan.edges)
-        self._renderer = Renderer(mujoco.MjModel.from_binary_path(str(plan.model)))
+        # One world that both robots see is loaded once.
+        edges = {files: Edges.load(files.edges) for files in plan.worlds.values()}
+        renderers = {files: _renderer(files) for files in edges}
+        self._edges = {robot: edges[files] for robot, files in plan.worlds.items()}
+        self._renderers = {robot: renderers[files] for robot, files in plan.worlds.items()}
         self._sensors: dict[Robot, ImageSensor] = {}
         if plan.preset.image is not None:
             for number, robot in enumerate(ROBOTS, start=1):
@@ -84,7 +95,8 @@ class FrameMaker:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._renderer.close()
+        for renderer in set(self._renderers.values()):
+            renderer.close()
 
     def make(self, robot: Robot, index: int) -> list[Written]:
         """Write the files of one frame."""
@@ -102,7 +114,7 @@ class FrameMaker:
         """(height, width) grey image of the MAV."""
         time_ns, rng = self._start("mav", index)
         T_world_camera = self._motion.camera_pose("mav", time_ns)
-        colour, depth = self._renderer.draw("mav", T_world_camera)
+        colour, depth = self._renderers["mav"].draw("mav", T_world_camera)
         grey = cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY)[..., None]
         grey = self._smooth("mav", grey, depth, T_world_camera)
         if "mav" in self._sensors:
@@ -113,7 +125,7 @@ class FrameMaker:
         """(height, width, 3) RGB and (height, width) depth as PNG values, of the ground robot."""
         time_ns, rng = self._start("ground", index)
         T_world_camera = self._motion.camera_pose("ground", time_ns)
-        colour, depth = self._renderer.draw("ground", T_world_camera)
+        colour, depth = self._renderers["ground"].draw("ground", T_world_camera)
         colour = self._smooth("ground", colour, depth, T_world_camera)
         if "ground" in self._sensors:
             colour = self._expose("ground", colour, depth, time_ns, rng)
@@ -134,7 +146,7 @@ class FrameMaker:
         self, robot: Robot, picture: NDArray, depth: NDArray, T_world_camera: SE3
     ) -> NDArray[np.uint8]:
         camera = self._table(robot).camera.pinhole()
-        return smooth_edges(picture, depth, camera, T_world_camera, self._edges)
+        return smooth_edges(picture, depth, camera, T_world_camera, self._edges[robot])
 
     def _expose(
         self, robot: Robot, sharp: NDArray, depth: NDArray, time_ns: int, rng: np.random.Generator
@@ -159,3 +171,7 @@ class FrameMaker:
 
     def _table(self, robot: Robot) -> RobotTable:
         return self._plan.true.mav if robot == "mav" else self._plan.true.ground
+
+
+def _renderer(files: WorldFiles) -> Renderer:
+    return Renderer(mujoco.MjModel.from_binary_path(str(files.model)))

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from airground.errors import RecordingError
-from sim.geometry.parts import Instances, read_parts
+from sim.geometry.parts import Instances
+from sim.recording.true_surface import TrueSurface
 from sim.recording.truth import Truth
 from sim.robots.motion import Robot
 
@@ -30,7 +30,7 @@ class PixelTruth:
     Attributes:
         camera, T_world_camera: True intrinsics, and true pose when the image was taken.
         depth: (height, width) float32 along the optical axis [m], NaN where there is nothing.
-        triangle: (height, width) int64 triangle of `truth/surface.ply`, -1 where there is nothing.
+        triangle: (height, width) int64 triangle of the robot's surface, -1 where there is nothing.
         normals: (height, width, 3) float32 unit normals in the camera's frame, toward the camera;
             NaN where there is nothing.
     """
@@ -51,7 +51,9 @@ def pixel_truth(truth: Truth, robot: Robot, stamp_ns: int) -> PixelTruth:
     """The truth of one image, by its nominal stamp [ns]."""
     camera, T_world_camera = truth.camera(robot), truth.T_world_camera(robot, stamp_ns)
     rays_camera = camera.rays()
-    answer = _cast(truth, T_world_camera.translation, rays_camera @ T_world_camera.rotation.T)
+    answer = _cast(
+        truth.surface(robot), T_world_camera.translation, rays_camera @ T_world_camera.rotation.T
+    )
     depth = answer["t_hit"].numpy()  # the rays have z = 1 in the camera
     hit = np.isfinite(depth)
     normals = answer["primitive_normals"].numpy() @ T_world_camera.rotation
@@ -66,16 +68,10 @@ def pixel_truth(truth: Truth, robot: Robot, stamp_ns: int) -> PixelTruth:
     )
 
 
-def instances_of(truth: Truth) -> Instances:
-    """The things of the surface; RecordingError if the list is missing or does not fit it."""
-    path = truth.folder / "parts.csv"
-    instances = Instances.of(read_parts(path))
-    count = len(truth.mesh.triangles)
-    if len(instances.of_triangle) != count:
-        raise RecordingError(
-            f"{path}: lists {len(instances.of_triangle)} triangles, surface.ply has {count}"
-        )
-    return instances
+def instances_of(truth: Truth, robot: Robot) -> Instances:
+    """The things that a robot sees; RecordingError if their list is missing or does not fit the
+    surface. A thing has the same id for both robots."""
+    return Instances.of(truth.surface(robot).parts, truth.surface("ground").parts)
 
 
 def instance_ids(seen: PixelTruth, instances: Instances) -> NDArray[np.uint16]:
@@ -105,25 +101,25 @@ def flow(truth: Truth, robot: Robot, seen: PixelTruth, other_stamp_ns: int) -> F
     points = seen.points_world().reshape(-1, 3)
     moved = camera.project(T_world_other.inverse() @ points)
     inside = ((moved >= -0.5) & (moved <= np.array([camera.width, camera.height]) - 0.5)).all(1)
-    visible = inside & _unhidden(truth, T_world_other.translation, points)
+    visible = inside & _unhidden(truth.surface(robot), T_world_other.translation, points)
     columns, rows = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
     shape = (camera.height, camera.width)
     at = np.stack([columns, rows], axis=-1)
     return Flow((moved.reshape(*shape, 2) - at).astype(np.float32), visible.reshape(shape))
 
 
-def _unhidden(truth: Truth, eye: NDArray, points: NDArray) -> NDArray[np.bool_]:
+def _unhidden(surface: TrueSurface, eye: NDArray, points: NDArray) -> NDArray[np.bool_]:
     """(N,) whether nothing is between `eye` and each of the points (N, 3)."""
     known = np.isfinite(points).all(1)
     clear = np.zeros(len(points), np.bool_)
     to_points = points[known] - eye
-    clear[known] = _cast(truth, eye, to_points)["t_hit"].numpy() > 1 - HIDDEN_SHARE
+    clear[known] = _cast(surface, eye, to_points)["t_hit"].numpy() > 1 - HIDDEN_SHARE
     return clear
 
 
-def _cast(truth: Truth, origin: NDArray, directions: NDArray) -> dict[str, o3d.core.Tensor]:
+def _cast(surface: TrueSurface, origin: NDArray, directions: NDArray) -> dict[str, o3d.core.Tensor]:
     """Open3D's answer to rays from one place."""
     origins = np.broadcast_to(origin, directions.shape)
     rays = np.concatenate([origins, directions], axis=-1).astype(np.float32)
-    answer: dict[str, o3d.core.Tensor] = truth.surface.cast_rays(o3d.core.Tensor.from_numpy(rays))
+    answer: dict[str, o3d.core.Tensor] = surface.scene.cast_rays(o3d.core.Tensor.from_numpy(rays))
     return answer

@@ -25,7 +25,7 @@ from airground.io.recording import Recording
 from sim.geometry.edges import find_edges
 from sim.partial_folder import partial_folder
 from sim.recording.frame_pool import FrameServer, make_frames
-from sim.recording.frames import FramePlan
+from sim.recording.frames import FramePlan, WorldFiles
 from sim.recording.render import with_cameras
 from sim.recording.truth import write_truth
 from sim.robots.motion import RATE_HZ, Robot, simulate_motion
@@ -34,7 +34,7 @@ from sim.scene import Scene
 from sim.sensors.imu import measure_field, measure_imu
 from sim.sensors.miscalibration import CAMERA_RATE_HZ, MAGNETOMETER_RATE_HZ, calibrate
 from sim.sensors.presets import SensorPreset
-from sim.world.world import build_world
+from sim.world.world import World, build_world, flight_world
 
 # The cameras share no trigger; no exposure may reach beyond the motion.
 FIRST_IMAGE_NS: dict[Robot, int] = {"mav": 50_000_000, "ground": 55_000_000}
@@ -93,10 +93,11 @@ def record(
     try:
         with partial_folder(out) as temporary:
             header, plan = write_all_but_images(temporary, what)
-            _store_model(plan, what)
+            _store_models(plan, what)
             digests = _render(plan, workers, progress)
-            plan.model.unlink()
-            plan.edges.unlink()
+            for files in set(plan.worlds.values()):
+                files.model.unlink()
+                files.edges.unlink()
             recording_writer.finish(temporary, header, digests)
             temporary.rename(out)
     except OSError as error:
@@ -121,7 +122,7 @@ def rendered(flight: Flight, workers: int) -> Iterator[Recording]:
         try:
             header, plan = write_all_but_images(root, flight)
             recording_writer.finish(root, header, {})
-            _store_model(plan, flight)
+            _store_models(plan, flight)
         except OSError as error:
             raise AirgroundError(f"{root}: the flight cannot be prepared there: {error}") from None
         with FrameServer(plan, workers) as frames:
@@ -147,12 +148,13 @@ class _DrawnImages:
 def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan]:
     """Simulate a flight and write its samples, lists and truth into an empty folder.
 
-    Returns the header, to be written last, and the plan of the images, which needs `_store_model`.
+    Returns the header, to be written last, and the plan of the images, which needs `_store_models`.
     """
     scene, preset, seeds = flight.scene, flight.sensors, (flight.seed, flight.flight)
     motion_rng, calibration_rng, mav_rng, ground_rng = np.random.default_rng(seeds).spawn(4)
     # Without pictures, so that an impossible flight is reported at once.
     world = build_world(scene, flight.seed, pictures=False)
+    flown = flight_world(world, pictures=False)
     motion = simulate_motion(world, scene, int(motion_rng.integers(2**63)), flight.duration_s)
     sensors = calibrate(
         scene.mav.camera_f_px, motion.mav.mounting, motion.ground.mounting, preset, calibration_rng
@@ -161,7 +163,7 @@ def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan]
         robot: image_stamps(motion.stamps_ns, first) for robot, first in FIRST_IMAGE_NS.items()
     }
     recording_writer.make_folders(root)
-    write_truth(root, world, motion, sensors.true)
+    write_truth(root, world, flown, motion, sensors.true)
     nominal = sensors.nominal
     mav_samples = _samples(motion.stamps_ns, motion.mav, preset, mav_rng)
     ground_samples = _samples(motion.stamps_ns, motion.ground, preset, ground_rng)
@@ -169,8 +171,7 @@ def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan]
     recording_writer.write_ground(root, nominal.ground, stamps["ground"], *ground_samples)
     plan = FramePlan(
         recording=root,
-        model=root / "world.mjb",
-        edges=root / "edges.npz",
+        worlds=_world_files(root, one=flown is world),
         motion=root / "truth/motion.npz",
         true=sensors.true,
         preset=preset,
@@ -190,17 +191,30 @@ def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan]
     return header, plan
 
 
-def _store_model(plan: FramePlan, flight: Flight) -> None:
-    """Build the world with its pictures once for all processes: they take long to make."""
-    world = build_world(flight.scene, flight.seed)
+def _world_files(root: Path, one: bool) -> dict[Robot, WorldFiles]:
+    """Files of the world that each robot sees; the same if they see one world."""
+    drive = WorldFiles(root / "world.mjb", root / "edges.npz")
+    flight = WorldFiles(root / "world_mav.mjb", root / "edges_mav.npz")
+    return {"mav": drive if one else flight, "ground": drive}
+
+
+def _store_models(plan: FramePlan, flight: Flight) -> None:
+    """Build the worlds with their pictures once for all processes: they take long to make."""
+    drive = build_world(flight.scene, flight.seed)
+    _store_model(plan, plan.worlds["ground"], drive)
+    if plan.worlds["mav"] != plan.worlds["ground"]:
+        _store_model(plan, plan.worlds["mav"], flight_world(drive))
+
+
+def _store_model(plan: FramePlan, files: WorldFiles, world: World) -> None:
     true = plan.true
     cameras = {"mav": true.mav.camera.pinhole(), "ground": true.ground.camera.pinhole()}
     model = with_cameras(world.spec, cameras)
     # MuJoCo only prints a warning when the disk is full.
     if shutil.disk_usage(plan.recording).free < mujoco.mj_sizeModel(model):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-    mujoco.mj_saveModel(model, str(plan.model), None)
-    find_edges((world.vertices, world.triangles), world.terrain).save(plan.edges)
+    mujoco.mj_saveModel(model, str(files.model), None)
+    find_edges((world.vertices, world.triangles), world.terrain).save(files.edges)
 
 
 def image_stamps(motion_stamps_ns: NDArray[np.int64], first_ns: int) -> NDArray[np.int64]:

@@ -3,18 +3,19 @@
 `truth/` holds `mav.tum` and `ground.tum` (T_world_body at the IMU's rate), `surface.ply`
 (the mesh of all that can be seen), `parts.csv` (what its triangles belong to), `boxes.csv`,
 `calibration.toml` (the real one, in the schema of the nominal one) and `motion.npz` (the exact
-states).
+states). If boxes change before the MAV flies, these files hold what the ground robot sees;
+`surface_mav.ply` and `parts_mav.csv` hold what the MAV sees, and `changes.csv` what has changed.
 """
 
 from __future__ import annotations
 
 import csv
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import open3d as o3d
 from numpy.typing import NDArray
 
 from airground.core.camera import PinholeCamera
@@ -25,7 +26,9 @@ from airground.io.calibration import CalibrationTable, RobotTable
 from airground.io.header import parse_table, read_toml, write_toml
 from airground.io.layout import TRUTH
 from airground.io.tum import write_tum
-from sim.geometry.parts import write_parts
+from sim.geometry.box import Box
+from sim.geometry.changes import Change
+from sim.recording.true_surface import TrueSurface
 from sim.robots.motion import ROBOTS, Motion, Robot
 from sim.world.world import World
 
@@ -68,57 +71,34 @@ class Truth:
         """True intrinsics."""
         return self.sensors(robot).camera.pinhole()
 
-    @cached_property
-    def mesh(self) -> o3d.geometry.TriangleMesh:
-        """The true surface, in `world`."""
-        path = self.folder / "surface.ply"
-        mesh = o3d.io.read_triangle_mesh(path) if path.is_file() else None
-        if mesh is None or not mesh.has_triangles():
-            raise RecordingError(f"{path}: no readable mesh with triangles")
-        vertices, triangles = np.asarray(mesh.vertices), np.asarray(mesh.triangles)
-        if not np.isfinite(vertices).all():
-            raise RecordingError(f"{path}: a vertex is not finite")
-        if triangles.min() < 0 or triangles.max() >= len(vertices):
-            raise RecordingError(f"{path}: a triangle has a vertex that is not there")
-        return mesh
+    def surface(self, robot: Robot) -> TrueSurface:
+        """The true surface of the world that a robot sees."""
+        return self._surfaces[robot]
 
     @cached_property
-    def surface(self) -> o3d.t.geometry.RaycastingScene:
-        """The true surface, ready for rays and distances."""
-        mesh = self.mesh
-        scene = o3d.t.geometry.RaycastingScene()
-        vertices = np.asarray(mesh.vertices).astype(np.float32)
-        scene.add_triangles(
-            o3d.core.Tensor.from_numpy(vertices),
-            o3d.core.Tensor.from_numpy(np.asarray(mesh.triangles).astype(np.uint32)),
-        )
-        return scene
-
-    def distance_to_surface(self, points_world: NDArray) -> NDArray[np.float32]:
-        """(N,) distance of points (N, 3) to the nearest point of the true surface [m]."""
-        points = np.ascontiguousarray(points_world, dtype=np.float32)
-        return self.surface.compute_distance(o3d.core.Tensor.from_numpy(points)).numpy()
+    def _surfaces(self) -> dict[Robot, TrueSurface]:
+        seen = _ground_surface(self.folder)
+        changed = _mav_surface(self.folder)
+        return {"ground": seen, "mav": changed if changed.path.exists() else seen}
 
     def depth(self, robot: Robot, stamp_ns: int) -> NDArray[np.float32]:
         """(height, width) true depth [m] of the frame with this stamp, NaN for nothing.
         For the true intrinsics; z along the optical axis.
         """
-        return self.cast(self.camera(robot), self.T_world_camera(robot, stamp_ns))
-
-    def cast(self, camera: PinholeCamera, T_world_camera: SE3) -> NDArray[np.float32]:
-        """(height, width) true depth [m] that any camera would see from anywhere."""
-        directions = camera.rays() @ T_world_camera.rotation.T
-        origins = np.broadcast_to(T_world_camera.translation, directions.shape)
-        rays = np.concatenate([origins, directions], axis=-1).astype(np.float32)
-        # Directions have z = 1 in the camera, so that their multiples are depths.
-        depth = self.surface.cast_rays(o3d.core.Tensor.from_numpy(rays))["t_hit"].numpy()
-        return np.where(np.isfinite(depth), depth, np.float32(np.nan))
+        return self.surface(robot).cast(self.camera(robot), self.T_world_camera(robot, stamp_ns))
 
 
 def write_truth(
-    recording: Path, world: World, motion: Motion, calibration: CalibrationTable
+    recording: Path, drive: World, flight: World, motion: Motion, calibration: CalibrationTable
 ) -> None:
-    """Write `truth/` into a recording's folder."""
+    """Write `truth/` into a recording's folder.
+
+    Args:
+        recording: Folder of the recording.
+        drive, flight: Worlds that the ground robot and the MAV see.
+        motion: Motion of both robots.
+        calibration: True calibration of the sensors.
+    """
     folder = recording / TRUTH
     folder.mkdir()
     write_toml(folder / "calibration.toml", calibration)
@@ -127,21 +107,54 @@ def write_truth(
         states = motion.robot(robot)
         poses = Trajectory(motion.stamps_ns, states.rotations_world, states.positions_world)
         write_tum(folder / f"{robot}.tum", poses)
-    mesh = o3d.geometry.TriangleMesh(
-        o3d.utility.Vector3dVector(np.array(world.vertices)),
-        o3d.utility.Vector3iVector(np.array(world.triangles)),
-    )
-    if not o3d.io.write_triangle_mesh(folder / "surface.ply", mesh):
-        raise OSError(f"{folder / 'surface.ply'}: cannot be written")
-    write_parts(folder / "parts.csv", world.parts)
-    _write_boxes(folder / "boxes.csv", world)
+    _ground_surface(folder).write(drive)
+    _write_boxes(folder / "boxes.csv", drive.boxes)
+    if flight.changes:
+        _mav_surface(folder).write(flight)
+        _write_changes(folder / "changes.csv", flight.changes)
 
 
-def _write_boxes(path: Path, world: World) -> None:
+def _ground_surface(truth: Path) -> TrueSurface:
+    return TrueSurface(truth / "surface.ply", truth / "parts.csv")
+
+
+def _mav_surface(truth: Path) -> TrueSurface:
+    return TrueSurface(truth / "surface_mav.ply", truth / "parts_mav.csv")
+
+
+_SIZE = tuple(f"{name} [m]" for name in ("sx", "sy", "sz"))
+_POSE = (*(f"{name} [m]" for name in ("tx", "ty", "tz")), "qx", "qy", "qz", "qw")
+
+
+def _write_boxes(path: Path, boxes: Sequence[Box]) -> None:
+    rows = [[box.name, *_numbers(box.size_m), *_pose(box)] for box in boxes]
+    _write_table(path, ["name", *_SIZE, *_POSE], rows)
+
+
+def _write_changes(path: Path, changes: Sequence[Change]) -> None:
+    """Empty cells: the box is gone."""
+    columns = [f"{column} {when}" for when in ("before", "after") for column in _POSE]
+    rows = [
+        [
+            change.before.name,
+            change.kind,
+            *_pose(change.before),
+            *(_pose(change.after) if change.after else [""] * len(_POSE)),
+        ]
+        for change in changes
+    ]
+    _write_table(path, ["name", "change", *columns], rows)
+
+
+def _write_table(path: Path, columns: list[str], rows: list[list[str]]) -> None:
     with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        sizes, places, turns = ("sx", "sy", "sz"), ("tx", "ty", "tz"), ("qx", "qy", "qz", "qw")
-        writer.writerow(["name", *(f"{s} [m]" for s in (*sizes, *places)), *turns])
-        for box in world.boxes:
-            pose = [*box.size_m, *box.T_world_box.translation, *box.T_world_box.quaternion_xyzw()]
-            writer.writerow([box.name, *(f"{value:.9f}" for value in pose)])
+        csv.writer(file, lineterminator="\n").writerows([columns, *rows])
+
+
+def _pose(box: Box) -> list[str]:
+    pose = box.T_world_box
+    return _numbers([*pose.translation, *pose.quaternion_xyzw()])
+
+
+def _numbers(values: Iterable[float]) -> list[str]:
+    return [f"{value:.9f}" for value in values]

@@ -14,10 +14,12 @@ from sim.appearance.bake_light import LightBaker
 from sim.appearance.cardboard import Make
 from sim.appearance.pictures import add_picture, paint_boxes
 from sim.appearance.print_marks import BRANDS
+from sim.geometry.box import Box
+from sim.geometry.changes import Change, boxes_after, change_heap
 from sim.geometry.ground_cover import grow_cover
 from sim.geometry.parts import Part
 from sim.geometry.rocks import scatter_rocks
-from sim.geometry.rubble import Box, make_heap
+from sim.geometry.rubble import make_heap
 from sim.geometry.surface import BOX_TRIANGLES, Mesh, box_mesh, join
 from sim.geometry.terrain import HeightField, make_terrain
 from sim.scene import Scene, Terrain
@@ -43,6 +45,7 @@ class World:
         parts: What the triangles belong to, in their order.
         boxes: The settled boxes, if any.
         terrain: The height field of natural ground; None is a floor at z = 0.
+        changes: What has happened to boxes since the ground robot saw them, if anything.
     """
 
     scene: Scene
@@ -53,6 +56,7 @@ class World:
     parts: tuple[Part, ...]
     boxes: tuple[Box, ...]
     terrain: HeightField | None = None
+    changes: tuple[Change, ...] = ()
 
     def __post_init__(self) -> None:
         vertices = read_only(self.vertices, "vertices", (None, 3), np.float64)
@@ -73,7 +77,7 @@ class World:
 
 
 def build_world(scene: Scene, seed: int, pictures: bool = True) -> World:
-    """Build the world of `scene`; the same seed gives the same bytes.
+    """Build the world of `scene`, as the ground robot sees it; the same seed gives the same bytes.
 
     Args:
         scene: Scene to build.
@@ -81,11 +85,42 @@ def build_world(scene: Scene, seed: int, pictures: bool = True) -> World:
         pictures: Without them surfaces have plain colours: the same geometry much sooner,
             for physics and truth.
     """
-    seeds = np.random.default_rng([seed, zlib.crc32(scene.name.encode())])
-    geometry_rng, picture_rng = seeds.spawn(2)
+    geometry_rng, picture_rng, _ = _streams(scene, seed)
     if scene.terrain:
         return _build_outdoor(scene, seed, scene.terrain, geometry_rng, picture_rng, pictures)
     boxes = make_heap(scene, geometry_rng)
+    return _build_indoor(scene, seed, boxes, (), picture_rng, pictures)
+
+
+def flight_world(drive: World, pictures: bool = True) -> World:
+    """The world as the MAV sees it: `drive`, that of the ground robot, if nothing changes.
+
+    Args:
+        drive: World from `build_world`, with or without pictures.
+        pictures: As for `build_world`.
+    """
+    scene, seed = drive.scene, drive.seed
+    _, picture_rng, change_rng = _streams(scene, seed)
+    changes = change_heap(scene, drive.boxes, change_rng)
+    if not changes:
+        return drive
+    return _build_indoor(scene, seed, drive.boxes, changes, picture_rng, pictures)
+
+
+def _streams(scene: Scene, seed: int) -> list[np.random.Generator]:
+    """Sources of geometry, of pictures, and of changes."""
+    return np.random.default_rng([seed, zlib.crc32(scene.name.encode())]).spawn(3)
+
+
+def _build_indoor(
+    scene: Scene,
+    seed: int,
+    heap: tuple[Box, ...],
+    changes: tuple[Change, ...],
+    picture_rng: np.random.Generator,
+    pictures: bool,
+) -> World:
+    boxes = boxes_after(heap, changes)
     box_meshes = [box_mesh(box.size_m, box.T_world_box) for box in boxes]
     surface = join([room_mesh(scene.room), *box_meshes])
     spec = _empty_spec(pictures)
@@ -93,9 +128,12 @@ def build_world(scene: Scene, seed: int, pictures: bool = True) -> World:
     floor = room_mesh(scene.room.model_copy(update={"wall_height_m": 0.0}))
     baker = _baker(scene, floor, box_meshes, _CONCRETE, _CARDBOARD) if pictures else None
     add_room(spec, scene.room, scene.texture, baker, picture_rng)
-    _add_boxes(spec, scene, boxes, baker, picture_rng)
+    if baker:
+        _add_box_pictures(spec, scene, heap, boxes, baker, picture_rng)
+    _add_boxes(spec, boxes, pictures)
     box_parts = [Part(box.name, "box", len(BOX_TRIANGLES)) for box in boxes]
-    return World(scene, seed, spec, *surface, (*room_parts(scene.room), *box_parts), boxes)
+    parts = (*room_parts(scene.room), *box_parts)
+    return World(scene, seed, spec, *surface, parts, boxes, changes=changes)
 
 
 def _build_outdoor(
@@ -153,20 +191,28 @@ def _empty_spec(lit: bool) -> mujoco.MjSpec:
     return spec
 
 
-def _add_boxes(
+def _add_box_pictures(
     spec: mujoco.MjSpec,
     scene: Scene,
+    heap: tuple[Box, ...],
     boxes: tuple[Box, ...],
-    baker: LightBaker | None,
+    baker: LightBaker,
     rng: np.random.Generator,
 ) -> None:
-    """Add every box as a geom of its name, with its own six pictures if they are lit."""
-    if baker and scene.rubble:
-        names = rng.permutation(BRANDS)
-        makes = [Make.draw(rng, str(names[k % len(names)])) for k in range(scene.rubble.makes)]
-        pictures = paint_boxes(boxes, makes, scene.texture, scene.rubble.printed, baker, rng)
-        for box, picture in zip(boxes, pictures, strict=True):
-            add_picture(spec, box.name, picture, cube=True)
+    """Give every one of `boxes` six pictures of its own, the same wherever a box of `heap` is."""
+    if not scene.rubble:
+        return
+    names = rng.permutation(BRANDS)
+    makes = [Make.draw(rng, str(names[k % len(names)])) for k in range(scene.rubble.makes)]
+    own = dict(zip((box.name for box in heap), rng.spawn(len(heap)), strict=True))
+    rngs = [own[box.name] for box in boxes]
+    pictures = paint_boxes(boxes, makes, scene.texture, scene.rubble.printed, baker, rngs)
+    for box, picture in zip(boxes, pictures, strict=True):
+        add_picture(spec, box.name, picture, cube=True)
+
+
+def _add_boxes(spec: mujoco.MjSpec, boxes: tuple[Box, ...], pictures: bool) -> None:
+    """Add every box as a geom of its name."""
     for box in boxes:
         spec.worldbody.add_geom(
             name=box.name,
@@ -174,5 +220,5 @@ def _add_boxes(
             size=box.size_m / 2,
             pos=box.T_world_box.translation,
             quat=np.roll(box.T_world_box.quaternion_xyzw(), 1),
-            **({"material": box.name} if baker else {"rgba": [0.72, 0.55, 0.36, 1]}),
+            **({"material": box.name} if pictures else {"rgba": [0.72, 0.55, 0.36, 1]}),
         )

@@ -99,7 +99,7 @@ def test_trajectories_are_those_of_the_motion(nominal: Path) -> None:
 def test_distances_to_the_surface(perfect: Path) -> None:
     truth = Truth.open(perfect)
     points = np.array([[2.3, -2.3, 0.05], [2.3, 2.3, -0.2]])
-    np.testing.assert_allclose(truth.distance_to_surface(points), [0.05, 0.2], atol=1e-6)
+    np.testing.assert_allclose(truth.surface("ground").distance(points), [0.05, 0.2], atol=1e-6)
     assert len((perfect / "truth" / "boxes.csv").read_text().splitlines()) == 3
 
 

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airground.errors import InputError
-from sim.geometry.rubble import distance_to_footprint, lane_points, make_heap
+from sim.geometry.lane import distance_to_footprint, lane_points
+from sim.geometry.rubble import make_heap
 from sim.scene import MAX_HEAP_HEIGHT_M, load_scene
 
 CUBE = np.array([[x, y, z] for x in (0.0, 2.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])

@@ -127,6 +127,6 @@ def _depth(recording: RobotRecording) -> Callable[[int, SE3], Seen]:
             grey = cv2.cvtColor(image.colour, cv2.COLOR_RGB2GRAY)
             return np.asarray(grey, np.uint8), image.depth
         assert truth is not None
-        return image.image, truth.cast(camera, T_world_camera)
+        return image.image, truth.surface("mav").cast(camera, T_world_camera)
 
     return seen

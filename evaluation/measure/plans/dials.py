@@ -59,6 +59,11 @@ DIALS = (
         lambda subject, value: _part(subject, "rubble", self_similarity=value),
     ),
     Dial(
+        "scene.changed", "", 0.0, 0.5,
+        "share of the boxes that have moved, fallen or gone when the MAV sees them",
+        lambda subject, value: _part(subject, "rubble", changed=value),
+    ),
+    Dial(
         "scene.heap_height", "", 0.1, 1.5,
         "all boxes so many times as large, and so the heap about so much higher",
         lambda subject, value: _part(subject, "rubble", size_scale=value),

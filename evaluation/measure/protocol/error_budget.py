@@ -29,7 +29,7 @@ def with_true_surface(sighting: Sighting, truth: Truth) -> Sighting:
     It is placed by the MAV's estimated pose, so that errors of poses stay."""
     surface = sighting.surface
     T_world_camera = truth.T_world_mav_camera(surface.reference_stamp_ns)
-    depth = truth.cast(surface.camera, T_world_camera)
+    depth = truth.surface("mav").cast(surface.camera, T_world_camera)
     seen = np.isfinite(depth)
     points = surface.camera.rays()[seen] * depth[seen][:, None]
     cloud = PointCloud(
@@ -45,7 +45,8 @@ def with_true_ground_map(sighting: Sighting, truth: Truth) -> Sighting:
     T_world_camera = truth.T_world_ground_camera(sighting.ground_stamp_ns)
     T_world_ground = T_world_camera @ sighting.T_ground_camera.inverse()
     points_world = (T_world_ground @ sighting.ground_cloud.points).astype(np.float32)
-    nearest = truth.surface.compute_closest_points(o3d.core.Tensor.from_numpy(points_world))
+    seen = truth.surface("ground").scene
+    nearest = seen.compute_closest_points(o3d.core.Tensor.from_numpy(points_world))
     points = T_world_ground.inverse() @ nearest["points"].numpy().astype(np.float64)
     cloud = PointCloud(points.astype(np.float32), sighting.ground_cloud.colours)
     return replace(sighting, ground_cloud=cloud)

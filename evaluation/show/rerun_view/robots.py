@@ -162,7 +162,7 @@ class TrueRobots:
             self._cameras[robot].draw(event.stamp_ns, T_world_camera)
 
     def _draw_scene(self) -> None:
-        mesh = self._truth.mesh
+        mesh = self._truth.surface("ground").mesh
         corners = np.asarray(mesh.vertices)[np.asarray(mesh.triangles)]
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)

@@ -72,7 +72,9 @@ def test_rays_through_the_pixels_meet_the_points(model, simulated: Simulated) ->
         )
         origins = np.broadcast_to(T.translation, (len(x), 3))
         rays = np.hstack([origins, (T.rotation @ ahead).T]).astype(np.float32)
-        hits = simulated.truth.surface.cast_rays(o3d.core.Tensor.from_numpy(rays))["t_hit"]
+        hits = simulated.truth.surface("ground").scene.cast_rays(o3d.core.Tensor.from_numpy(rays))[
+            "t_hit"
+        ]
         points = np.array([model.points3D[p.point3D_id].xyz for p in observed])
         off = np.linalg.norm(origins + hits.numpy()[:, None] * rays[:, 3:] - points, axis=1)
         assert np.median(off) < 2e-4

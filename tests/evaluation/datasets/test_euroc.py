@@ -125,6 +125,6 @@ def test_samples_without_their_biases_carry_the_state_onwards(
 
 def test_the_surface_is_the_true_one(mav0: Path, simulated: Simulated) -> None:
     cloud = o3d.io.read_point_cloud(str(mav0 / "pointcloud0" / "data.ply"))
-    distances = simulated.truth.distance_to_surface(np.asarray(cloud.points))
+    distances = simulated.truth.surface("mav").distance(np.asarray(cloud.points))
     assert len(distances) == 200_000
     assert distances.max() < 1e-5

@@ -50,14 +50,14 @@ def test_depth_lands_on_the_true_surface(
         near = np.where(depth < 2500, depth, 0)
         points = world_points(content, frame, near)[::50]
         assert len(points) > 500
-        assert np.median(simulated.truth.distance_to_surface(points)) < 0.01
+        assert np.median(simulated.truth.surface("mav").distance(points)) < 0.01
 
 
 def test_points_to_begin_with_are_on_the_surface_and_coloured(
     folder: Path, simulated: Simulated
 ) -> None:
     cloud = o3d.io.read_point_cloud(str(folder / "points.ply"))
-    assert simulated.truth.distance_to_surface(np.asarray(cloud.points)).max() < 1e-5
+    assert simulated.truth.surface("mav").distance(np.asarray(cloud.points)).max() < 1e-5
     assert np.asarray(cloud.colors).std() > 0.04
 
 

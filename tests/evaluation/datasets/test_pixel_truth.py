@@ -73,7 +73,7 @@ def test_normals_face_a_camera_behind_a_surface_too(
 
 
 def test_things_are_where_the_list_of_boxes_says(simulated: Simulated) -> None:
-    seen, instances = seen_by(simulated, "mav"), instances_of(simulated.truth)
+    seen, instances = seen_by(simulated, "mav"), instances_of(simulated.truth, "mav")
     ids, points = instance_ids(seen, instances), seen.points_world()
     assert instances.names == ["floor", "box_000", "box_001"]
     with (simulated.truth.folder / "boxes.csv").open() as file:
@@ -134,7 +134,7 @@ def test_others_read_the_files(simulated: Simulated, tmp_path: Path) -> None:
     known = np.isfinite(seen.depth)
     np.testing.assert_allclose(normals[known], seen.normals[known], atol=2e-5)
     assert (image("normals")[~known] == 0).all()
-    instances = instances_of(simulated.truth)
+    instances = instances_of(simulated.truth, "mav")
     ids = image("segmentation/instance")
     assert ids.dtype == np.uint16
     np.testing.assert_array_equal(ids, instance_ids(seen, instances))

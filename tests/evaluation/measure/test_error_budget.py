@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -26,7 +25,7 @@ from evaluation.show.report.error_budget import budget_figure, budget_table
 from evaluation.table.row_writer import RowWriter
 from evaluation.table.rows import ResultTable
 from evaluation.table.truth_errors import true_T_ground_mav
-from sim.recording.truth import Truth
+from sim.recording.true_surface import TrueSurface
 
 CAMERA = PinholeCamera(40, 30, 30.0, 30.0, 19.5, 14.5)
 DOWN = SE3.from_rotation_vector([np.pi, 0, 0], [0.5, 0.2, 2.0])
@@ -40,10 +39,10 @@ class FlatTruth:
     """A floor at height zero, and two cameras that stand still."""
 
     def __init__(self) -> None:
-        self.surface = o3d.t.geometry.RaycastingScene()
+        self.scene = o3d.t.geometry.RaycastingScene()
         corners = np.array([[-9, -9, 0], [9, -9, 0], [9, 9, 0], [-9, 9, 0]], np.float32)
         faces = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
-        self.surface.add_triangles(
+        self.scene.add_triangles(
             o3d.core.Tensor.from_numpy(corners), o3d.core.Tensor.from_numpy(faces)
         )
 
@@ -53,8 +52,11 @@ class FlatTruth:
     def T_world_ground_camera(self, stamp_ns: int) -> SE3:
         return AHEAD
 
+    def surface(self, robot: str) -> FlatTruth:
+        return self
+
     def cast(self, camera: PinholeCamera, T_world_camera: SE3) -> NDArray[np.float32]:
-        return Truth.cast(cast(Truth, SimpleNamespace(surface=self.surface)), camera, DOWN)
+        return TrueSurface.cast(cast(TrueSurface, self), camera, DOWN)
 
 
 @pytest.fixture(scope="module")

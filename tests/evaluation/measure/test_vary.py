@@ -103,6 +103,7 @@ def test_dials_turn_what_they_name() -> None:
     point = {
         "scene.overlap": 0.6,
         "scene.self_similarity": 0.3,
+        "scene.changed": 0.25,
         "scene.heap_height": 0.5,
         "scene.flight_height": 3.0,
         "scene.camera_height": 1.0,
@@ -118,7 +119,7 @@ def test_dials_turn_what_they_name() -> None:
     scene = subject.scene
     assert scene.rubble is not None
     assert (scene.rubble.self_similarity, scene.rubble.size_scale) == (0.3, 0.5)
-    assert scene.rubble.printed == 0.4
+    assert (scene.rubble.printed, scene.rubble.changed) == (0.4, 0.25)
     assert (scene.ground.stop_at_overlap, scene.ground.camera_height_m) == (0.6, 1.0)
     assert (scene.mav.height_m, scene.texture) == (3.0, 0.2)
     assert subject.config.height_maps.cells_per_m == 50.0

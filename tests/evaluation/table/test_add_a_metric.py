@@ -26,6 +26,9 @@ CAMERA = PinholeCamera(6, 4, 5.0, 5.0, 2.5, 1.5)
 class Plane:
     """A truth in which everything is 2 m away."""
 
+    def surface(self, robot: str) -> Plane:
+        return self
+
     def cast(self, camera: PinholeCamera, T_world_camera: SE3) -> NDArray[np.float32]:
         return np.full((camera.height, camera.width), 2.0, np.float32)
 
