@@ -88,7 +88,7 @@ def assert_no_silent_jump(sequence: Sequence, tracked: list[TrackedPose]) -> Non
 
 
 def _longest_step(before: TrackedPose) -> float:
-    """Nobody is surprised by a correction [m] while scale and vertical are stated as uncertain."""
+    """A correction [m] is no error while scale and vertical are stated as uncertain."""
     if before.scale is None or before.scale.sigma < SETTLED_SIGMA:
         return MAX_STEP_ERROR_M
     assert before.covariance is not None
