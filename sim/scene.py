@@ -19,6 +19,7 @@ Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Point = tuple[float, float]
+Colour = tuple[NonNegative, NonNegative, NonNegative]
 
 MAX_HEAP_HEIGHT_M = 1.1
 """Least height of the MAV's flight, above any heap of any seed [m]."""
@@ -112,6 +113,13 @@ class Light(Part):
     """The same by a broad light from the opposite side."""
     ambient: NonNegative = 0.35
     """The same by the sky or the ceiling."""
+    main_colour: Colour = (1.03, 1.0, 0.94)
+    """Factors of the main light's red, green and blue."""
+    ambient_colour: Colour = (0.95, 1.0, 1.07)
+    """The same of the light from all around."""
+    lamp_m: tuple[float, float, Annotated[float, Field(gt=MAX_HEAP_HEIGHT_M)]] | None = None
+    """Place of a lamp that gives the main light, in place of a direction [m]; `main` is then the
+    irradiance of the level ground below it, and `radius_deg` is seen from there."""
 
 
 class MavPath(Part):
@@ -168,10 +176,21 @@ class Scene(Part):
     light on it."""
     room: Room
     light: Light = Light()
+    flight_light: Light | None = None
+    """Light when the MAV sees the world, if it is another one; keys that it leaves out are those
+    of `light`."""
     rubble: Rubble | None = None
     terrain: Terrain | None = None
     mav: MavPath
     ground: GroundPath
+
+    @model_validator(mode="before")
+    @classmethod
+    def _flight_light_completed(cls, data: Any) -> Any:
+        light, flight_light = (data.get(key, {}) for key in ("light", "flight_light"))
+        if isinstance(light, dict) and isinstance(flight_light, dict) and flight_light:
+            return {**data, "flight_light": {**light, **flight_light}}
+        return data
 
     @model_validator(mode="after")
     def _parts_fit(self) -> Scene:
@@ -258,6 +277,7 @@ def _known_keys(location: tuple[Any, ...]) -> list[str]:
     tables: dict[str, type[Part]] = {
         "room": Room,
         "light": Light,
+        "flight_light": Light,
         "rubble": Rubble,
         "terrain": Terrain,
         "mav": MavPath,

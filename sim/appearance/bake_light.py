@@ -23,8 +23,6 @@ _FILL_RADIUS_DEG = 25.0
 _LIFT_M = 0.002
 _CHUNK = 20_000
 _GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))
-_MAIN_COLOUR = np.array([1.03, 1.0, 0.94])
-_AMBIENT_COLOUR = np.array([0.95, 1.0, 1.07])
 # Light that a surface seen by a hemisphere ray sends back, per unit of its albedo: about half
 # of what open ground receives, for among boxes most surfaces lie in shade.
 _BOUNCE = 0.55
@@ -57,14 +55,32 @@ class LightBaker:
         light = self.light
         origins = (points + _LIFT_M * normals).astype(np.float32)
         normals = normals.astype(np.float32)
-        main = _cone(light.azimuth_deg, light.elevation_deg, light.radius_deg, MAIN_SAMPLES)
-        total = light.main * self._lamp(origins, normals, main)[:, None] * _MAIN_COLOUR
+        total = light.main * self._main(origins, normals)[:, None] * np.array(light.main_colour)
         if light.fill > 0:
             fill = _cone(light.azimuth_deg + 150, 50.0, _FILL_RADIUS_DEG, FILL_SAMPLES)
-            total = total + light.fill * self._lamp(origins, normals, fill)[:, None]
+            total = total + light.fill * self._far_lamp(origins, normals, fill)[:, None]
         return (total + self._ambient(origins, normals)).astype(np.float32)
 
-    def _lamp(self, origins: NDArray, normals: NDArray, directions: NDArray) -> NDArray:
+    def _main(self, origins: NDArray, normals: NDArray) -> NDArray:
+        light = self.light
+        if light.lamp_m is not None:
+            return self._near_lamp(origins, normals, np.array(light.lamp_m))
+        sun = _cone(light.azimuth_deg, light.elevation_deg, light.radius_deg, MAIN_SAMPLES)
+        return self._far_lamp(origins, normals, sun)
+
+    def _near_lamp(self, origins: NDArray, normals: NDArray, lamp: NDArray) -> NDArray:
+        """(N,) irradiance by a ball, 1 for level ground at height 0 below it."""
+        ball = _cone(0.0, 90.0, self.light.radius_deg, MAIN_SAMPLES) * lamp[2]
+        rays = np.empty((len(origins), MAIN_SAMPLES, 6), np.float32)
+        rays[..., :3] = origins[:, None]
+        # A disc that faces up, moved to the lamp.
+        rays[..., 3:] = lamp + ball - [0, 0, lamp[2]] - origins[:, None]
+        length = np.linalg.norm(rays[..., 3:], axis=2)
+        cosine = np.maximum((rays[..., 3:] * normals[:, None]).sum(2) / length, 0)
+        distance, _ = self.caster.hits(rays)
+        return (cosine * (lamp[2] / length) ** 2 * (distance > 1)).mean(1)
+
+    def _far_lamp(self, origins: NDArray, normals: NDArray, directions: NDArray) -> NDArray:
         """(N,) irradiance, 1 for open level ground."""
         cosine = np.maximum(normals @ directions.T, 0)
         lit = np.zeros_like(cosine)
@@ -81,7 +97,9 @@ class LightBaker:
         rays = _hemisphere_rays(origins, normals, AMBIENT_SAMPLES)
         _, hit = self.caster.hits(rays)
         bounce = _BOUNCE * (self.light.main + self.light.ambient)
-        return _gather(hit, self.albedo, bounce, self.light.ambient * _AMBIENT_COLOUR)
+        return _gather(
+            hit, self.albedo, bounce, self.light.ambient * np.array(self.light.ambient_colour)
+        )
 
 
 def _cone(azimuth_deg: float, elevation_deg: float, radius_deg: float, count: int) -> NDArray:

@@ -22,7 +22,7 @@ from sim.geometry.rocks import scatter_rocks
 from sim.geometry.rubble import make_heap
 from sim.geometry.surface import BOX_TRIANGLES, Mesh, box_mesh, join
 from sim.geometry.terrain import HeightField, make_terrain
-from sim.scene import Scene, Terrain
+from sim.scene import Light, Scene, Terrain
 from sim.world.outdoor import add_cover, add_ground, add_rocks
 from sim.world.room import add_room, room_mesh, room_parts
 
@@ -87,9 +87,10 @@ def build_world(scene: Scene, seed: int, pictures: bool = True) -> World:
     """
     geometry_rng, picture_rng, _ = _streams(scene, seed)
     if scene.terrain:
-        return _build_outdoor(scene, seed, scene.terrain, geometry_rng, picture_rng, pictures)
+        rngs = geometry_rng, picture_rng
+        return _build_outdoor(scene, seed, scene.terrain, scene.light, *rngs, pictures)
     boxes = make_heap(scene, geometry_rng)
-    return _build_indoor(scene, seed, boxes, (), picture_rng, pictures)
+    return _build_indoor(scene, seed, boxes, (), scene.light, picture_rng, pictures)
 
 
 def flight_world(drive: World, pictures: bool = True) -> World:
@@ -100,11 +101,15 @@ def flight_world(drive: World, pictures: bool = True) -> World:
         pictures: As for `build_world`.
     """
     scene, seed = drive.scene, drive.seed
-    _, picture_rng, change_rng = _streams(scene, seed)
+    geometry_rng, picture_rng, change_rng = _streams(scene, seed)
     changes = change_heap(scene, drive.boxes, change_rng)
-    if not changes:
+    light = scene.light if scene.flight_light is None else scene.flight_light
+    if not changes and light == scene.light:
         return drive
-    return _build_indoor(scene, seed, drive.boxes, changes, picture_rng, pictures)
+    rngs = geometry_rng, picture_rng
+    if scene.terrain:
+        return _build_outdoor(scene, seed, scene.terrain, light, *rngs, pictures)
+    return _build_indoor(scene, seed, drive.boxes, changes, light, picture_rng, pictures)
 
 
 def _streams(scene: Scene, seed: int) -> list[np.random.Generator]:
@@ -117,6 +122,7 @@ def _build_indoor(
     seed: int,
     heap: tuple[Box, ...],
     changes: tuple[Change, ...],
+    light: Light,
     picture_rng: np.random.Generator,
     pictures: bool,
 ) -> World:
@@ -126,7 +132,7 @@ def _build_indoor(
     spec = _empty_spec(pictures)
     # Walls throw no shadows, for the lamps hang inside the room.
     floor = room_mesh(scene.room.model_copy(update={"wall_height_m": 0.0}))
-    baker = _baker(scene, floor, box_meshes, _CONCRETE, _CARDBOARD) if pictures else None
+    baker = _baker(light, floor, box_meshes, _CONCRETE, _CARDBOARD) if pictures else None
     add_room(spec, scene.room, scene.texture, baker, picture_rng)
     if baker:
         _add_box_pictures(spec, scene, heap, boxes, baker, picture_rng)
@@ -140,6 +146,7 @@ def _build_outdoor(
     scene: Scene,
     seed: int,
     terrain: Terrain,
+    light: Light,
     geometry_rng: np.random.Generator,
     picture_rng: np.random.Generator,
     pictures: bool,
@@ -150,7 +157,7 @@ def _build_outdoor(
     cover = grow_cover(terrain, ground, rock_meshes, geometry_rng)
     things = [*rock_meshes, cover.mesh()]
     spec = _empty_spec(pictures)
-    baker = _baker(scene, ground.mesh(), things, _SOIL, _STONE) if pictures else None
+    baker = _baker(light, ground.mesh(), things, _SOIL, _STONE) if pictures else None
     add_ground(spec, ground, scene, baker, picture_rng)
     add_rocks(spec, rocks, scene.texture, baker, picture_rng)
     add_cover(spec, cover, scene.texture, baker, picture_rng)
@@ -164,12 +171,12 @@ def _build_outdoor(
 
 
 def _baker(
-    scene: Scene, floor: Mesh, things: list[Mesh], floor_albedo: tuple, thing_albedo: tuple
+    light: Light, floor: Mesh, things: list[Mesh], floor_albedo: tuple, thing_albedo: tuple
 ) -> LightBaker:
     mesh = join([floor, *things])
     albedo = np.tile(thing_albedo, (len(mesh[1]), 1))
     albedo[: len(floor[1])] = floor_albedo
-    return LightBaker.of(mesh, albedo, scene.light)
+    return LightBaker.of(mesh, albedo, light)
 
 
 def _empty_spec(lit: bool) -> mujoco.MjSpec:

@@ -10,7 +10,8 @@ from typing import Any
 from airground.config import Config
 from airground.errors import InputError
 from evaluation.setup.settings import with_value
-from sim.scene import MAX_HEAP_HEIGHT_M, Scene
+from sim.appearance.other_light import later_light, light_between
+from sim.scene import MAX_HEAP_HEIGHT_M, Light, Scene
 from sim.sensors.presets import SensorPreset, with_heading_error, with_noise
 
 Value = float | int | str | bool | list[Any]
@@ -62,6 +63,12 @@ DIALS = (
         "scene.changed", "", 0.0, 0.5,
         "share of the boxes that have moved, fallen or gone when the MAV sees them",
         lambda subject, value: _part(subject, "rubble", changed=value),
+    ),
+    Dial(
+        "scene.light", "", 0.0, 1.0,
+        "how far the light that the MAV sees is from that of the ground robot: 1 is "
+        "[flight_light], or else a low, warm sun from another side",
+        lambda subject, value: _scene(subject, flight_light=_flight_light(subject.scene, value)),
     ),
     Dial(
         "scene.heap_height", "", 0.1, 1.5,
@@ -173,6 +180,12 @@ def _part(subject: Subject, part: str, **change: float) -> Subject:
     if table is None:
         raise InputError(f"--vary: scene '{subject.scene.name}' has no [{part}] to change")
     return _scene(subject, **{part: table.model_copy(update=change)})
+
+
+def _flight_light(scene: Scene, share: float) -> Light | None:
+    """None at 0: both robots see one world."""
+    far = later_light(scene.light) if scene.flight_light is None else scene.flight_light
+    return light_between(scene.light, far, share) if share > 0 else None
 
 
 def _scene(subject: Subject, **change: object) -> Subject:
