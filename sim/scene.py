@@ -154,6 +154,10 @@ class GroundPath(Part):
     """Largest yaw rate [deg/s]."""
     waypoints: Annotated[tuple[tuple[float, float, float], ...], Field(min_length=2)]
     """x [m], y [m] and heading [deg, 0 looks along +x, counter-clockwise]."""
+    lamp: Annotated[float, Field(ge=0, le=10)] = 0.0
+    """Irradiance by a lamp at the camera of what faces it at 1 m, in units of `light`."""
+    lamp_beam_deg: Annotated[float, Field(ge=5, le=80)] = 30.0
+    """Angle from the camera's axis at which the lamp shines half as bright [deg]."""
     stop_at_overlap: Fraction | None = None
     """The robot stops as soon as it has seen this share of what the MAV flies over (the
     median that `sim.robots.overlap` measures); without it, it drives all the way. The heap stays

@@ -30,14 +30,15 @@ _BOUNCE = 0.55
 
 @dataclass(frozen=True)
 class LightBaker:
-    """Casts rays in a world; `albedo` is (T, 3) mean linear reflectance of its triangles."""
+    """Casts rays in a world; `albedo` is (T, 3) mean linear reflectance of its triangles.
+    Without a light it leaves pictures as they are painted."""
 
-    light: Light
+    light: Light | None
     caster: RayCaster
     albedo: NDArray[np.float32]
 
     @classmethod
-    def of(cls, mesh: Mesh, albedo: NDArray, light: Light) -> LightBaker:
+    def of(cls, mesh: Mesh, albedo: NDArray, light: Light | None) -> LightBaker:
         return cls(light, RayCaster(mesh), np.asarray(albedo, np.float32))
 
     def shade(self, points: NDArray, normals: NDArray) -> NDArray[np.float32]:
@@ -45,32 +46,36 @@ class LightBaker:
 
         `points` (N, 3) are on the surface [m], `normals` (N, 3) are outward unit vectors.
         """
+        if self.light is None:
+            return np.ones((len(points), 3), np.float32)
         pieces = [
-            self._irradiance(points[k : k + _CHUNK], normals[k : k + _CHUNK])
+            self._irradiance(self.light, points[k : k + _CHUNK], normals[k : k + _CHUNK])
             for k in range(0, len(points), _CHUNK)
         ]
         return np.concatenate(pieces) ** (1 / DISPLAY_GAMMA)
 
-    def _irradiance(self, points: NDArray, normals: NDArray) -> NDArray[np.float32]:
-        light = self.light
+    def _irradiance(self, light: Light, points: NDArray, normals: NDArray) -> NDArray[np.float32]:
         origins = (points + _LIFT_M * normals).astype(np.float32)
         normals = normals.astype(np.float32)
-        total = light.main * self._main(origins, normals)[:, None] * np.array(light.main_colour)
+        total = (
+            light.main * self._main(light, origins, normals)[:, None] * np.array(light.main_colour)
+        )
         if light.fill > 0:
             fill = _cone(light.azimuth_deg + 150, 50.0, _FILL_RADIUS_DEG, FILL_SAMPLES)
             total = total + light.fill * self._far_lamp(origins, normals, fill)[:, None]
-        return (total + self._ambient(origins, normals)).astype(np.float32)
+        return (total + self._ambient(light, origins, normals)).astype(np.float32)
 
-    def _main(self, origins: NDArray, normals: NDArray) -> NDArray:
-        light = self.light
+    def _main(self, light: Light, origins: NDArray, normals: NDArray) -> NDArray:
         if light.lamp_m is not None:
-            return self._near_lamp(origins, normals, np.array(light.lamp_m))
+            return self._near_lamp(origins, normals, np.array(light.lamp_m), light.radius_deg)
         sun = _cone(light.azimuth_deg, light.elevation_deg, light.radius_deg, MAIN_SAMPLES)
         return self._far_lamp(origins, normals, sun)
 
-    def _near_lamp(self, origins: NDArray, normals: NDArray, lamp: NDArray) -> NDArray:
+    def _near_lamp(
+        self, origins: NDArray, normals: NDArray, lamp: NDArray, radius_deg: float
+    ) -> NDArray:
         """(N,) irradiance by a ball, 1 for level ground at height 0 below it."""
-        ball = _cone(0.0, 90.0, self.light.radius_deg, MAIN_SAMPLES) * lamp[2]
+        ball = _cone(0.0, 90.0, radius_deg, MAIN_SAMPLES) * lamp[2]
         rays = np.empty((len(origins), MAIN_SAMPLES, 6), np.float32)
         rays[..., :3] = origins[:, None]
         # A disc that faces up, moved to the lamp.
@@ -92,14 +97,13 @@ class LightBaker:
             lit[facing] = ~self.caster.blocked(rays)
         return (cosine * lit).sum(1) / np.maximum(directions[:, 2], 0).sum()
 
-    def _ambient(self, origins: NDArray, normals: NDArray) -> NDArray:
+    def _ambient(self, light: Light, origins: NDArray, normals: NDArray) -> NDArray:
         """(N, 3): open hemisphere gives the ambient level, what it hits bounces some light."""
         rays = _hemisphere_rays(origins, normals, AMBIENT_SAMPLES)
         _, hit = self.caster.hits(rays)
-        bounce = _BOUNCE * (self.light.main + self.light.ambient)
-        return _gather(
-            hit, self.albedo, bounce, self.light.ambient * np.array(self.light.ambient_colour)
-        )
+        bounce = _BOUNCE * (light.main + light.ambient)
+        sky = light.ambient * np.array(light.ambient_colour)
+        return _gather(hit, self.albedo, bounce, sky)
 
 
 def _cone(azimuth_deg: float, elevation_deg: float, radius_deg: float, count: int) -> NDArray:

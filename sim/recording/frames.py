@@ -16,6 +16,7 @@ from airground.io.calibration import CalibrationTable, RobotTable
 from airground.io.digests import bytes_digest
 from airground.io.recording_writer import ground_image_name, mav_image_name
 from sim.geometry.edges import Edges
+from sim.recording.carried_lamp import CarriedLamp
 from sim.recording.render import Renderer
 from sim.recording.smooth_edges import smooth_edges
 from sim.robots.motion import ROBOTS, Motion, Robot
@@ -51,6 +52,8 @@ class FramePlan:
         recording: Folder that images are written into.
         worlds: What each robot sees.
         motion: File of the motion.
+        unlit: What the ground robot sees, without light, for the lamp that it carries.
+        lamp: The lamp; None without one.
         true: True calibration of the sensors.
         stamps_ns: Nominal stamps of each robot's images [ns].
     """
@@ -62,6 +65,13 @@ class FramePlan:
     preset: SensorPreset
     seeds: tuple[int, int]
     stamps_ns: dict[Robot, NDArray[np.int64]]
+    unlit: WorldFiles | None = None
+    lamp: CarriedLamp | None = None
+
+    def world_files(self) -> set[WorldFiles]:
+        """Files of all worlds."""
+        unlit = set() if self.unlit is None else {self.unlit}
+        return set(self.worlds.values()) | unlit
 
 
 @dataclass(frozen=True)
@@ -84,6 +94,7 @@ class FrameMaker:
         renderers = {files: _renderer(files) for files in edges}
         self._edges = {robot: edges[files] for robot, files in plan.worlds.items()}
         self._renderers = {robot: renderers[files] for robot, files in plan.worlds.items()}
+        self._unlit = None if plan.unlit is None else _renderer(plan.unlit)
         self._sensors: dict[Robot, ImageSensor] = {}
         if plan.preset.image is not None:
             for number, robot in enumerate(ROBOTS, start=1):
@@ -97,6 +108,8 @@ class FrameMaker:
     def __exit__(self, *_: object) -> None:
         for renderer in set(self._renderers.values()):
             renderer.close()
+        if self._unlit is not None:
+            self._unlit.close()
 
     def make(self, robot: Robot, index: int) -> list[Written]:
         """Write the files of one frame."""
@@ -127,6 +140,11 @@ class FrameMaker:
         T_world_camera = self._motion.camera_pose("ground", time_ns)
         colour, depth = self._renderers["ground"].draw("ground", T_world_camera)
         colour = self._smooth("ground", colour, depth, T_world_camera)
+        if self._unlit is not None and self._plan.lamp is not None:
+            unlit, _ = self._unlit.draw("ground", T_world_camera)
+            unlit = self._smooth("ground", unlit, depth, T_world_camera)
+            rays = self._table("ground").camera.pinhole().rays()
+            colour = self._plan.lamp.lit(colour, unlit, depth, rays)
         if "ground" in self._sensors:
             colour = self._expose("ground", colour, depth, time_ns, rng)
         if self._plan.preset.depth is not None:

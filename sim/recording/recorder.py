@@ -24,6 +24,7 @@ from airground.io.images import metric_depth
 from airground.io.recording import Recording
 from sim.geometry.edges import find_edges
 from sim.partial_folder import partial_folder
+from sim.recording.carried_lamp import CarriedLamp
 from sim.recording.frame_pool import FrameServer, make_frames
 from sim.recording.frames import FramePlan, WorldFiles
 from sim.recording.render import with_cameras
@@ -34,7 +35,7 @@ from sim.scene import Scene
 from sim.sensors.imu import measure_field, measure_imu
 from sim.sensors.miscalibration import CAMERA_RATE_HZ, MAGNETOMETER_RATE_HZ, calibrate
 from sim.sensors.presets import SensorPreset
-from sim.world.world import World, build_world, flight_world
+from sim.world.world import World, build_world, flight_world, unlit_world
 
 # The cameras share no trigger; no exposure may reach beyond the motion.
 FIRST_IMAGE_NS: dict[Robot, int] = {"mav": 50_000_000, "ground": 55_000_000}
@@ -95,7 +96,7 @@ def record(
             header, plan = write_all_but_images(temporary, what)
             _store_models(plan, what)
             digests = _render(plan, workers, progress)
-            for files in set(plan.worlds.values()):
+            for files in plan.world_files():
                 files.model.unlink()
                 files.edges.unlink()
             recording_writer.finish(temporary, header, digests)
@@ -177,6 +178,8 @@ def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan]
         preset=preset,
         seeds=seeds,
         stamps_ns=stamps,
+        unlit=_unlit_files(root) if scene.ground.lamp > 0 else None,
+        lamp=CarriedLamp(scene.ground.lamp, scene.ground.lamp_beam_deg),
     )
     header = Header(
         scene=scene.name,
@@ -198,12 +201,18 @@ def _world_files(root: Path, one: bool) -> dict[Robot, WorldFiles]:
     return {"mav": drive if one else flight, "ground": drive}
 
 
+def _unlit_files(root: Path) -> WorldFiles:
+    return WorldFiles(root / "world_unlit.mjb", root / "edges_unlit.npz")
+
+
 def _store_models(plan: FramePlan, flight: Flight) -> None:
     """Build the worlds with their pictures once for all processes: they take long to make."""
     drive = build_world(flight.scene, flight.seed)
     _store_model(plan, plan.worlds["ground"], drive)
     if plan.worlds["mav"] != plan.worlds["ground"]:
         _store_model(plan, plan.worlds["mav"], flight_world(drive))
+    if plan.unlit is not None:
+        _store_model(plan, plan.unlit, unlit_world(drive))
 
 
 def _store_model(plan: FramePlan, files: WorldFiles, world: World) -> None:

@@ -38,7 +38,7 @@ def add_ground(
     """Add the terrain with one picture over all of it, so that no seam shows."""
     if baker:
         size = (float(ground.size_m[0]), float(ground.size_m[1]))
-        painted = paint_ground(size, GROUND_PX_PER_M, baker.light.azimuth_deg, rng)
+        painted = paint_ground(size, GROUND_PX_PER_M, (baker.light or scene.light).azimuth_deg, rng)
         unlit = faded(painted, scene.texture)
         picture = np.empty(unlit.shape, np.uint8)
         terrain = scene.terrain

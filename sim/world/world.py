@@ -112,6 +112,16 @@ def flight_world(drive: World, pictures: bool = True) -> World:
     return _build_indoor(scene, seed, drive.boxes, changes, light, picture_rng, pictures)
 
 
+def unlit_world(drive: World) -> World:
+    """The world as the ground robot sees it, its pictures without light."""
+    scene, seed = drive.scene, drive.seed
+    geometry_rng, picture_rng, _ = _streams(scene, seed)
+    if scene.terrain:
+        rngs = geometry_rng, picture_rng
+        return _build_outdoor(scene, seed, scene.terrain, None, *rngs, True)
+    return _build_indoor(scene, seed, drive.boxes, (), None, picture_rng, True)
+
+
 def _streams(scene: Scene, seed: int) -> list[np.random.Generator]:
     """Sources of geometry, of pictures, and of changes."""
     return np.random.default_rng([seed, zlib.crc32(scene.name.encode())]).spawn(3)
@@ -122,7 +132,7 @@ def _build_indoor(
     seed: int,
     heap: tuple[Box, ...],
     changes: tuple[Change, ...],
-    light: Light,
+    light: Light | None,
     picture_rng: np.random.Generator,
     pictures: bool,
 ) -> World:
@@ -146,7 +156,7 @@ def _build_outdoor(
     scene: Scene,
     seed: int,
     terrain: Terrain,
-    light: Light,
+    light: Light | None,
     geometry_rng: np.random.Generator,
     picture_rng: np.random.Generator,
     pictures: bool,
@@ -171,7 +181,7 @@ def _build_outdoor(
 
 
 def _baker(
-    light: Light, floor: Mesh, things: list[Mesh], floor_albedo: tuple, thing_albedo: tuple
+    light: Light | None, floor: Mesh, things: list[Mesh], floor_albedo: tuple, thing_albedo: tuple
 ) -> LightBaker:
     mesh = join([floor, *things])
     albedo = np.tile(thing_albedo, (len(mesh[1]), 1))

@@ -71,6 +71,11 @@ DIALS = (
         lambda subject, value: _scene(subject, flight_light=_flight_light(subject.scene, value)),
     ),
     Dial(
+        "scene.lamp", "", 0.0, 10.0,
+        "lamp at the ground robot's camera: its irradiance of what faces it at 1 m",
+        lambda subject, value: _part(subject, "ground", lamp=value),
+    ),
+    Dial(
         "scene.heap_height", "", 0.1, 1.5,
         "all boxes so many times as large, and so the heap about so much higher",
         lambda subject, value: _part(subject, "rubble", size_scale=value),

@@ -105,6 +105,7 @@ def test_dials_turn_what_they_name() -> None:
         "scene.self_similarity": 0.3,
         "scene.changed": 0.25,
         "scene.light": 0.5,
+        "scene.lamp": 1.5,
         "scene.heap_height": 0.5,
         "scene.flight_height": 3.0,
         "scene.camera_height": 1.0,
@@ -122,6 +123,7 @@ def test_dials_turn_what_they_name() -> None:
     assert (scene.rubble.self_similarity, scene.rubble.size_scale) == (0.3, 0.5)
     assert (scene.rubble.printed, scene.rubble.changed) == (0.4, 0.25)
     assert (scene.ground.stop_at_overlap, scene.ground.camera_height_m) == (0.6, 1.0)
+    assert scene.ground.lamp == 1.5
     assert scene.flight_light is not None
     assert scene.flight_light.azimuth_deg == scene.light.azimuth_deg + 60
     assert (scene.mav.height_m, scene.texture) == (3.0, 0.2)
