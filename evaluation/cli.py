@@ -7,62 +7,19 @@ heavy imports wait for its `main()`, so that `--help` answers at once.
 from __future__ import annotations
 
 import contextlib
-import importlib
+import difflib
 import io
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from airground import __version__
+from evaluation.commands.verbs import JOBS, VERBS, verb_class
 from evaluation.setup import console, progress
 from evaluation.setup.environment import prepare
 
 if TYPE_CHECKING:
     from evaluation.commands.options import Verb
-
-JOBS: dict[str, dict[str, tuple[str, str]]] = {
-    "data": {
-        "simulate": ("data", "Record what the robots' sensors see in a scene, or in many."),
-        "render": ("data", "Add exact truth of every pixel to a recording."),
-        "inspect": ("data", "Say what is in a dataset, and what is wrong with it."),
-        "export": ("data", "Write a recording, with its truth, in a format that other tools read."),
-    },
-    "one recording": {
-        "run": ("run", "Run the pipeline over a recording and measure it against the truth."),
-        "track": ("track", "Track one robot alone, with one front end or several."),
-        "live": (
-            "live",
-            "Play a recording at its own rate through the pipeline, as live robots would send it.",
-        ),
-        "view": ("look", "Look into a run with rerun: in a window, a browser, or as a file."),
-        "gallery": (
-            "look",
-            "Draw the pictures of a run as PNG files: maps, depth, costs, particles, errors.",
-        ),
-    },
-    "many recordings": {
-        "reproduce": ("reproduce", "Do all of it: the paper's protocol, from scenes to report."),
-        "sweep": ("sweep", "Turn dials, and measure what that does: curves with intervals."),
-    },
-    "results": {
-        "evaluate": ("results", "Put the results of one or more runs into one report."),
-        "compare": ("results", "Draw two to four runs on one page: what changed, and by how much."),
-        "check": (
-            "results",
-            "Hold results against accepted ones: better, worse, or no difference seen.",
-        ),
-        "accept": ("results", "Accept results: later changes are held against them."),
-    },
-    "this machine": {
-        "bench": ("machine", "Time the pipeline's stages on this machine (Table I)."),
-        "doctor": (
-            "machine",
-            "Look whether this machine can render and compute, and say what is missing.",
-        ),
-    },
-}
-"""Verbs by job, each with its module in `evaluation.commands` and the first line of its help."""
-VERBS = {name: verb for verbs in JOBS.values() for name, verb in verbs.items()}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -81,7 +38,8 @@ def answer(words: list[str]) -> int | None:
         return console.EXIT_OK
     name, *rest = words
     if name not in VERBS:
-        console.print_error(f"unknown verb {name!r}; known: {', '.join(VERBS)}")
+        meant = _nearest(name, VERBS)
+        console.print_error(f"unknown verb {name!r};{meant} known: {', '.join(VERBS)}")
         return console.EXIT_ERROR
     if "-h" in rest or "--help" in rest:
         from evaluation.commands.help import help_text
@@ -94,7 +52,7 @@ def answer(words: list[str]) -> int | None:
 def carry_out(verb: Verb) -> int | None:
     """Settle threads, rendering and logging, then do what the verb does."""
     prepare(verb.threads)
-    console.start_logging(verb.verbose)
+    console.start_logging(verb.verbose, verb.log)
     with progress.shown():
         return verb.main()
 
@@ -111,13 +69,6 @@ def overview() -> str:
         lines += ["", f"{job}:"]
         lines += [f"  {name:<{width}}  {line}" for name, (_, line) in verbs.items()]
     return "\n".join([*lines, "", "airground VERB --help lists the options of a verb."])
-
-
-def verb_class(name: str) -> type[Verb]:
-    """The dataclass of a verb."""
-    module = importlib.import_module(f"evaluation.commands.{VERBS[name][0]}")
-    verb: type[Verb] = getattr(module, name.capitalize())
-    return verb
 
 
 def parse(name: str, words: Sequence[str]) -> Verb:
@@ -137,7 +88,8 @@ def parse(name: str, words: Sequence[str]) -> Verb:
     except SystemExit as exit_:
         if exit_.code not in (None, 0):
             said = _first_part(complaint.getvalue())
-            console.print_error(f"{_missing(name, said) or said} (see {program} --help)")
+            clearer = _missing(name, said) or _unknown(name, said) or said
+            console.print_error(f"{clearer} (see {program} --help)")
         raise
 
 
@@ -150,6 +102,25 @@ def _missing(name: str, said: str) -> str:
     options = [one for group in grouped_options(verb_class(name)).values() for one in group]
     forms = [one.form for one in options if one.required and one.form.split()[0] in said.split()]
     return f"missing: {', '.join(forms)}" if forms else ""
+
+
+def _unknown(name: str, said: str) -> str:
+    """Tyro's message about options that a verb lacks, with the nearest that it has."""
+    from evaluation.commands.help import grouped_options
+
+    if not said.startswith("Unrecognized options:"):
+        return ""
+    known = [
+        one.form.split()[0] for group in grouped_options(verb_class(name)).values() for one in group
+    ]
+    wrong = next((word.rstrip(",") for word in said.split() if word.startswith("--")), "")
+    return f"{said};{_nearest(wrong, known)}".rstrip(";")
+
+
+def _nearest(word: str, known: Iterable[str]) -> str:
+    """A question for the known word that looks most like this one; empty if none does."""
+    alike = difflib.get_close_matches(word, known, n=1)
+    return f" did you mean {alike[0]}?" if alike else ""
 
 
 def _first_part(box: str) -> str:

@@ -63,6 +63,8 @@ class Verb(ABC):
     """threads and processes to use"""
     verbose: bool = False
     """log each step, and the traceback of an internal error"""
+    log: Annotated[Path | None, Shown("FILE")] = None
+    """add the log of each step to this file, with times"""
 
     def workers(self) -> int:
         """How many threads or processes to use."""

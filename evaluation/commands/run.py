@@ -117,8 +117,7 @@ class RerunOptions:
 class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption, OutOption, Verb):
     """Run the pipeline over a recording and measure it against the truth.
 
-    Leaves the augmented map, both robots' trajectories, the measurements and the report. Your own
-    two recordings need no truth; what needs it is left out.
+    Leaves the map, trajectories, measurements and the report. Your own recordings need no truth.
     """
 
     sections: ClassVar[tuple[str, ...]] = ("oracle", "rerun")

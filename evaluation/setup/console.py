@@ -25,7 +25,7 @@ from pathlib import Path
 from types import FrameType
 
 from airground import __version__
-from airground.errors import AirgroundError
+from airground.errors import AirgroundError, InputError
 from evaluation.setup.progress import stderr
 
 EXIT_OK = 0
@@ -42,13 +42,23 @@ class Terminated(KeyboardInterrupt):
     """SIGTERM: unwinds like Ctrl-C, so that half-written output is cleaned up."""
 
 
-def start_logging(verbose: bool) -> None:
-    """Send the log to stderr; `verbose` shows what is done at each step."""
+def start_logging(verbose: bool, file: Path | None = None) -> None:
+    """Send the log to stderr; `verbose` shows what is done at each step. A `file` is added to, with
+    each step and its time; InputError if that is not possible."""
     from rich.logging import RichHandler
 
     handler = RichHandler(console=stderr(), show_path=False, show_time=verbose)
     logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler], force=True)
     level = logging.DEBUG if verbose else logging.INFO
+    handler.setLevel(level)
+    if file is not None:
+        try:
+            kept = logging.FileHandler(file, encoding="utf-8")
+        except OSError as error:
+            raise InputError(f"--log {file}: cannot be written: {error.strerror}") from None
+        kept.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
+        logging.getLogger().addHandler(kept)
+        level = logging.DEBUG
     for room in ("airground", "sim", "evaluation"):
         logging.getLogger(room).setLevel(level)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import errno
+import logging
 import os
 import re
 import resource
@@ -57,7 +58,7 @@ def test_every_verb_explains_itself(
     first_line = (cli.verb_class(verb).__doc__ or "").splitlines()[0]
     assert first_line == cli.VERBS[verb][1]
     assert first_line in said
-    shown = re.findall(r"^  (?:--([a-z-]+)|[A-Z]+)\b", said, re.MULTILINE)
+    shown = re.findall(r"^  (?:--([a-z-]+)|[A-Z]+|{[a-z,]+})(?:\s|$)", said, re.MULTILINE)
     assert len(shown) == len(dataclasses.fields(cli.verb_class(verb)))
     assert "verbose" in shown
 
@@ -107,7 +108,11 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("words", "named"),
     [
-        (["simulat"], "known: simulate, render, inspect, export, run"),
+        (["simulat"], "did you mean simulate? known: simulate, render, inspect, export, run"),
+        (["zzz"], "unknown verb 'zzz'; known: simulate"),
+        (["doctor", "--thred", "2"], "--thred, 2; did you mean --threads? (see airground doctor"),
+        (["doctor", "--zzz"], "Unrecognized options: --zzz (see"),
+        (["doctor", "--log", "no_such_folder/log"], "--log no_such_folder/log: cannot be written"),
         (["simulate", "flat", "--out", "x", "--sensors", "good"], "'nominal'"),
         (["simulate", "flat", "--out", "x", "--seed", "a"], "--seed"),
         (["simulate", "flat", "--out", "x", "--sed", "1"], "--sed"),
@@ -145,6 +150,20 @@ def test_simulate_refuses_what_it_cannot_record(
     assert exit_code("simulate", *words, "--out", str(out)) == console.EXIT_ERROR
     assert named in one_error_line(capsys)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_log_keeps_every_step_and_is_added_to(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def work() -> None:
+        logging.getLogger("airground.somewhere").debug("a step")
+
+    monkeypatch.setattr(logging.getLogger(), "handlers", [])
+    for _ in range(2):
+        console.start_logging(verbose=False, file=tmp_path / "log")
+        work()
+    lines = (tmp_path / "log").read_text().splitlines()
+    assert [line.split(" DEBUG ")[1] for line in lines] == 2 * ["airground.somewhere: a step"]
 
 
 def test_an_existing_folder_is_left_alone(
