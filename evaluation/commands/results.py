@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from tyro.conf import Positional
+from tyro.conf import Positional, arg
 
 from airground.errors import InputError
 from evaluation.commands.options import OutOption, Shown, Verb
@@ -85,21 +85,29 @@ class Check(Verb):
     """write the table for a pull request"""
     junit: Annotated[Path | None, Shown("FILE")] = None
     """write one test case per metric for continuous integration"""
+    as_json: Annotated[Path | None, arg(name="json"), Shown("FILE")] = None
+    """write verdicts, figures and intervals for programs"""
+    badge: Annotated[Path | None, Shown("FILE")] = None
+    """write the verdict as an endpoint badge of shields.io"""
 
     def main(self) -> int:
         from evaluation.judge.accepted import Measured
         from evaluation.judge.results import read_table
         from evaluation.judge.verdict import Verdict, compare
-        from evaluation.show.comparison import verdict_table
+        from evaluation.show.comparison import verdict_json, verdict_table
 
         before = self._reference()
         after = Measured.of(read_table(self.results), before.condition)
         comparison = compare(before, after)
         verdict_table.print_comparison(comparison)
-        if self.markdown is not None:
-            self.markdown.write_text(verdict_table.markdown(comparison), encoding="utf-8")
-        if self.junit is not None:
-            self.junit.write_text(verdict_table.junit(comparison), encoding="utf-8")
+        for file, written in (
+            (self.markdown, verdict_table.markdown),
+            (self.junit, verdict_table.junit),
+            (self.as_json, verdict_json.as_json),
+            (self.badge, verdict_json.badge),
+        ):
+            if file is not None:
+                file.write_text(written(comparison), encoding="utf-8")
         return EXIT_WORSE if comparison.of(Verdict.WORSE) else EXIT_OK
 
     def _reference(self) -> Measured:

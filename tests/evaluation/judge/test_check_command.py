@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -10,11 +11,13 @@ import pytest
 from rich.console import Console
 
 from evaluation import cli
+from evaluation.judge.accepted import Measured
 from evaluation.judge.metrics import WATCHED
 from evaluation.judge.summary import build_summary
-from evaluation.judge.verdict import compare
+from evaluation.judge.verdict import Verdict, compare
 from evaluation.setup import console
 from evaluation.setup.condition import RunInfo
+from evaluation.show.comparison.verdict_json import as_json, badge, outcome
 from evaluation.show.comparison.verdict_table import HEADER, cells, markdown, print_comparison
 from evaluation.table.rows import ResultTable
 from tests.evaluation.judge.flights import make_results, measured
@@ -71,6 +74,56 @@ def test_worse_results_fail_and_are_reported_in_three_forms(accepted: Path, tmp_
     failed = [case.get("name") for case in cases if case.find("failure") is not None]
     assert failed == ["surface_median"]
     assert (suite.get("tests"), suite.get("failures")) == (str(len(WATCHED)), "1")
+
+
+def test_programs_read_what_the_screen_shows(accepted: Path, tmp_path: Path) -> None:
+    results = write(make_results(SEEDS, {"error_median_m": 1.4}), tmp_path / "worse")
+    made, shield = tmp_path / "check.json", tmp_path / "badge.json"
+    words = ("check", results, "--against", accepted, "--json", made, "--badge", shield)
+    assert exit_code(*words) == console.EXIT_WORSE
+    read = json.loads(made.read_text())
+    assert (read["verdict"], read["conclusion"]) == ("worse", "1 worse: surface, median error")
+    assert [one["name"] for one in read["metrics"]] == [metric.name for metric in WATCHED]
+    (moved,) = [one for one in read["metrics"] if one["name"] == "surface_median"]
+    assert moved["change"] == pytest.approx(moved["now"] - moved["accepted"], rel=0.1)
+    assert 0 < moved["low"] <= moved["change"] <= moved["high"]
+    assert moved["p"] <= read["alpha"]
+    assert moved["shown"]["verdict"] == moved["verdict"] == "worse"
+    assert json.loads(shield.read_text()) == {
+        "schemaVersion": 1,
+        "label": "accuracy",
+        "message": "1 worse",
+        "color": "red",
+    }
+
+
+@pytest.mark.parametrize(
+    ("factor", "word", "colour"),
+    [(1.4, "worse", "red"), (0.7, "better", "brightgreen"), (1.0, "no difference seen", "green")],
+)
+def test_one_word_sums_up_all_metrics(factor: float, word: str, colour: str) -> None:
+    comparison = compare(measured(SEEDS), measured(SEEDS, {"error_median_m": factor}))
+    assert outcome(comparison) == word
+    assert json.loads(badge(comparison))["color"] == colour
+
+
+def test_failures_are_null_in_json_and_words_beside_it() -> None:
+    failed = measured(SEEDS, {"error_median_m": float("inf")})
+    read = json.loads(as_json(compare(measured(SEEDS), failed)))
+    (moved,) = [one for one in read["metrics"] if one["name"] == "surface_median"]
+    assert (moved["now"], moved["change"]) == (None, None)
+    assert (moved["shown"]["now"], moved["shown"]["change"]) == ("failed", "fails")
+
+
+def test_one_observation_has_values_and_no_interval_in_json() -> None:
+    single = Measured.of(one_recording(0))
+    comparison = compare(single, single)
+    names = {judged.metric.name for judged in comparison.of(Verdict.SINGLE)}
+    assert names
+    for one in json.loads(as_json(comparison))["metrics"]:
+        if one["name"] in names:
+            assert one["now"] is not None
+            assert (one["low"], one["high"], one["p"]) == (None, None, None)
 
 
 def test_better_results_pass(accepted: Path, tmp_path: Path) -> None:
