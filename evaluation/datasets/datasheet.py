@@ -95,7 +95,24 @@ def _scenes(scenes: Sequence[Scene]) -> list[str]:
         for scene in scenes
     ]
     columns = ["scene", "what", "room [m]", "boxes", "flight height [m]", "overlap"]
-    return ["## Geometry", "", *_table(columns, rows)]
+    return ["## Geometry", "", *_table(columns, rows), *_two_worlds(scenes)]
+
+
+def _two_worlds(scenes: Sequence[Scene]) -> list[str]:
+    """A line for each scene in which the robots do not see the same world."""
+    lines = []
+    for scene in scenes:
+        share = scene.rubble.changed if scene.rubble else 0.0
+        if share > 0:
+            lines.append(
+                f"- `{scene.name}`: {100 * share:.0f} % of the boxes have moved, fallen or gone "
+                "when the MAV sees them (`truth/changes.csv`, `truth/surface_mav.ply`)."
+            )
+        if scene.flight_light is not None:
+            lines.append(f"- `{scene.name}`: the MAV sees it in another light.")
+        if scene.ground.lamp > 0:
+            lines.append(f"- `{scene.name}`: the ground robot carries a lamp.")
+    return [*lines, ""] if lines else []
 
 
 def _robots(header: Header) -> list[str]:

@@ -20,6 +20,7 @@ from airground.io.recording import Recording
 from evaluation import cli
 from evaluation.datasets import collection
 from evaluation.datasets.collection import make_dataset
+from evaluation.datasets.datasheet import datasheet
 from evaluation.datasets.plan import Plan, parse_seeds, parse_split, plan_dataset
 from evaluation.measure.work.crew import Crew
 from sim.recording.recorder import record
@@ -144,6 +145,22 @@ def test_the_data_sheet_states_the_facts(made: Made, tmp_path: Path, small: Path
         assert f"## {heading}" in sheet
     for world in plan.worlds:
         assert re.search(rf"\| {world.folder} \| .* \d+\.\d \| \d+\.\d \|", sheet)
+
+
+def test_the_data_sheet_says_where_the_robots_see_two_worlds(small: Path) -> None:
+    tiny = load_scene("tiny")
+    changed = {
+        "rubble": tiny.rubble.model_copy(update={"changed": 0.25}),
+        "flight_light": tiny.light.model_copy(update={"main": 0.2}),
+        "ground": tiny.ground.model_copy(update={"lamp": 1.0}),
+    }
+    plain, two = (
+        datasheet("made", [scene], NOMINAL, [("train", small)])
+        for scene in (tiny, tiny.model_copy(update=changed))
+    )
+    added = [line for line in two.splitlines() if line not in plain.splitlines()]
+    assert [line.split(":")[0] for line in added] == ["- `tiny`"] * 3
+    assert "25 % of the boxes" in added[0]
 
 
 @pytest.mark.parametrize(
