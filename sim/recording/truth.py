@@ -32,6 +32,9 @@ from sim.recording.true_surface import TrueSurface
 from sim.robots.motion import ROBOTS, Motion, Robot
 from sim.world.world import World
 
+_CHANGES = "changes.csv"
+"""Its presence says that the MAV sees another surface than the ground robot."""
+
 
 @dataclass(frozen=True, eq=False)
 class Truth:
@@ -78,8 +81,8 @@ class Truth:
     @cached_property
     def _surfaces(self) -> dict[Robot, TrueSurface]:
         seen = _ground_surface(self.folder)
-        changed = _mav_surface(self.folder)
-        return {"ground": seen, "mav": changed if changed.path.exists() else seen}
+        changed = (self.folder / _CHANGES).exists()
+        return {"ground": seen, "mav": _mav_surface(self.folder) if changed else seen}
 
     def depth(self, robot: Robot, stamp_ns: int) -> NDArray[np.float32]:
         """(height, width) true depth [m] of the frame with this stamp, NaN for nothing.
@@ -111,7 +114,7 @@ def write_truth(
     _write_boxes(folder / "boxes.csv", drive.boxes)
     if flight.changes:
         _mav_surface(folder).write(flight)
-        _write_changes(folder / "changes.csv", flight.changes)
+        _write_changes(folder / _CHANGES, flight.changes)
 
 
 def _ground_surface(truth: Path) -> TrueSurface:

@@ -1,6 +1,7 @@
 """A recording of a world that changes: each robot's images and truth are of the world it sees."""
 
 import csv
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
+from airground.errors import RecordingError
 from airground.io.digests import path_digest
 from airground.io.recording import Recording
 from sim.geometry.edges import find_edges
@@ -121,6 +123,13 @@ def test_a_thing_has_the_same_id_for_both_robots(recorded: Path) -> None:
     seen = pixel_truth(truth, "mav", stamps(recorded, "mav")[-1])
     shown = {mav.names[index - 1] for index in np.unique(instance_ids(seen, mav)) if index}
     assert shown <= {part.name for part in truth.surface("mav").parts}
+
+
+def test_a_missing_surface_of_the_mav_is_reported(recorded: Path, tmp_path: Path) -> None:
+    copy = shutil.copytree(recorded, tmp_path / "copy")
+    (copy / "truth/surface_mav.ply").unlink()
+    with pytest.raises(RecordingError, match=r"surface_mav\.ply: no readable mesh"):
+        _ = Truth.open(copy).surface("mav").mesh
 
 
 def test_without_changes_the_recording_is_what_it_was(tmp_path: Path) -> None:
