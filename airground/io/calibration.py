@@ -10,9 +10,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from airground.core.camera import PinholeCamera
 from airground.core.messages import ImuNoise, RobotCalibration
 from airground.core.se3 import ROTATION_TOLERANCE, SE3
+from airground.io.lens import COEFFICIENTS, MAX_READOUT_S, Lens, Model, Undistortion
 
 Positive = Annotated[float, Field(gt=0)]
 Row = tuple[float, float, float, float]
@@ -45,8 +45,15 @@ def pose_rows(pose: SE3) -> Pose:
     return tuple(tuple(float(v) for v in row) for row in pose.matrix())  # type: ignore[return-value]
 
 
+def _is_zero(value: float) -> bool:
+    return value == 0
+
+
 class CameraTable(Table):
-    """A pinhole camera; integer pixel coordinates are pixel centres."""
+    """A camera; integer pixel coordinates are pixel centres.
+
+    A file leaves out the keys of distortion for a pinhole camera, and `readout_s` for a global
+    shutter."""
 
     width: Annotated[int, Field(ge=1, le=MAX_SIDE_PX)]
     height: Annotated[int, Field(ge=1, le=MAX_SIDE_PX)]
@@ -57,6 +64,13 @@ class CameraTable(Table):
     rate_hz: Positive
     time_offset_ns: int
     """What to add to a stamp of the camera to get the time on the IMU's clock [ns]."""
+    distortion_model: Annotated[Model | None, Field(exclude_if=lambda model: model is None)] = None
+    distortion_coefficients: Annotated[
+        tuple[float, ...], Field(exclude_if=lambda numbers: not numbers)
+    ] = ()
+    """In OpenCV's order; see `Lens`."""
+    readout_s: Annotated[float, Field(ge=0, le=MAX_READOUT_S, exclude_if=_is_zero)] = 0.0
+    """Time from the first to the last row of an image [s]; a stamp is that of the middle row."""
 
     @model_validator(mode="after")
     def _principal_point_inside(self) -> CameraTable:
@@ -67,8 +81,29 @@ class CameraTable(Table):
             )
         return self
 
-    def pinhole(self) -> PinholeCamera:
-        return PinholeCamera(self.width, self.height, self.fx, self.fy, self.cx, self.cy)
+    @model_validator(mode="after")
+    def _lens_that_can_be(self) -> CameraTable:
+        count, model = len(self.distortion_coefficients), self.distortion_model
+        wanted = COEFFICIENTS[model] if model else (0,)
+        if count not in wanted:
+            numbers = " or ".join(map(str, wanted))
+            raise ValueError(
+                f"distortion_coefficients: expected {numbers} for {model or 'no distortion_model'}"
+            )
+        if self.lens().folds():
+            raise ValueError("distortion_coefficients: the image would fold back within its pixels")
+        return self
+
+    def lens(self) -> Lens:
+        """The camera with its distortion and shutter."""
+        return Lens(
+            self.width,
+            self.height,
+            (self.fx, self.fy, self.cx, self.cy),
+            self.distortion_coefficients,
+            self.distortion_model or "radial-tangential",
+            self.readout_s,
+        )
 
 
 class ImuTable(Table):
@@ -101,6 +136,8 @@ class DepthTable(Table):
 
     units_per_m: Positive
     """PNG value of one metre of depth along the optical axis."""
+    delay_ns: Annotated[int, Field(exclude_if=_is_zero)] = 0
+    """Time of a depth image minus that of the colour image with the same stamp [ns]."""
 
 
 class RobotTable(Table):
@@ -113,12 +150,15 @@ class RobotTable(Table):
     magnetometer: MagnetometerTable
 
     def calibration(self) -> RobotCalibration:
+        """The sensors as stages see them: with undistorted images."""
+        undistortion = Undistortion(self.camera.lens())
         return RobotCalibration(
-            camera=self.camera.pinhole(),
+            camera=undistortion.camera,
             T_imu_camera=SE3.from_matrix(self.T_imu_camera),
             T_body_imu=SE3.from_matrix(self.T_body_imu),
             imu=self.imu.noise(),
             camera_time_offset_ns=self.camera.time_offset_ns,
+            readout_s=undistortion.readout_s,
         )
 
 

@@ -69,12 +69,15 @@ def write_image_list(path: Path, stamps_ns: I64, names: list[str]) -> None:
 
 def camera_yaml(camera: CameraTable, T_body_camera: SE3) -> str:
     """`sensor.yaml` of a camera for tools of the field; the body of EuRoC is the IMU here."""
+    model = camera.distortion_model or "radial-tangential"
+    numbers = ", ".join(map(repr, camera.distortion_coefficients or (0.0,) * 4))
+    shutter = f"readout_s: {camera.readout_s!r}\n" if camera.readout_s else ""
     return (
         f"sensor_type: camera\ncomment: pinhole\n{_pose_yaml(T_body_camera)}"
         f"rate_hz: {camera.rate_hz}\nresolution: [{camera.width}, {camera.height}]\n"
         f"camera_model: pinhole\n"
         f"intrinsics: [{camera.fx!r}, {camera.fy!r}, {camera.cx!r}, {camera.cy!r}]\n"
-        "distortion_model: radial-tangential\ndistortion_coefficients: [0.0, 0.0, 0.0, 0.0]\n"
+        f"distortion_model: {model}\ndistortion_coefficients: [{numbers}]\n{shutter}"
     )
 
 

@@ -6,17 +6,25 @@ structure."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Literal
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from airground.core.arrays import F32, F64, U8
+from airground.core.arrays import F32, F64, U8, Floats
 from airground.core.camera import PinholeCamera
 
 Model = Literal["radial-tangential", "equidistant"]
 
+COEFFICIENTS: dict[Model, tuple[int, ...]] = {
+    "radial-tangential": (4, 5, 8, 12, 14),
+    "equidistant": (4,),
+}
+"""How many coefficients a model can have, in OpenCV's order."""
+MAX_READOUT_S = 0.1
+"""Rolling shutters take up to about 50 ms; a larger number is one of milliseconds."""
 KINECT_READOUT_S = 0.02611
 """Readout time of the Kinect's colour camera [s] (Ringaby and Forssen, "Scan rectification for
 structured light range sensors with rolling shutters", ICCV 2011)."""
@@ -30,6 +38,8 @@ FOLD_STEPS = 2000
 """Angles at which a lens is held against folding: steps of a twentieth of a degree."""
 MAX_FOLD_ANGLE = np.deg2rad(85.0)
 """Widest angle for which a radial-tangential model is used [rad]."""
+RAY_CRITERIA = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 200, 1e-13)
+"""Steps and precision of the search for the ray of a pixel: 1e-10 px for a focal length of 1000."""
 MAX_ZOOM = 4.0
 """Largest focal length that is tried, over the lens's own: the principal point is never so far
 off the centre that an image needs more."""
@@ -56,9 +66,13 @@ class Lens:
     model: Model = "radial-tangential"
     readout_s: float = 0.0
 
+    def pinhole(self) -> PinholeCamera:
+        """The camera without the distortion."""
+        return PinholeCamera(self.width, self.height, *self.intrinsics)
+
     def matrix(self) -> F64:
         """The (3, 3) intrinsic matrix."""
-        return PinholeCamera(self.width, self.height, *self.intrinsics).matrix()
+        return self.pinhole().matrix()
 
     @property
     def bends(self) -> bool:
@@ -83,6 +97,60 @@ class Lens:
                 bent /= np.polyval([k[7], k[6], k[5], 1.0], squares)
         turns = np.flatnonzero(~(np.diff(bent) > 0))
         return len(turns) > 0 and not bent[turns[0]] >= nearest
+
+    def rays(self) -> F64:
+        """(height, width, 3) directions with z = 1 through every pixel centre."""
+        if not self.bends:
+            return self.pinhole().rays()
+        columns, rows = np.meshgrid(np.arange(self.width), np.arange(self.height))
+        pixels = np.stack([columns, rows], axis=-1).astype(np.float64)
+        return self._rays(pixels.reshape(-1, 2)).reshape(self.height, self.width, 3)
+
+    def _rays(self, pixels: F64) -> F64:
+        """(N, 3) directions with z = 1 through pixels (N, 2)."""
+        undistort: Any = (
+            cv2.fisheye.undistortPoints if self.model == "equidistant" else cv2.undistortPoints
+        )
+        given = pixels[:, None], self.matrix(), np.array(self.distortion)
+        straight = undistort(*given, criteria=RAY_CRITERIA)[:, 0]
+        return np.column_stack([straight, np.ones(len(straight))])
+
+    def project(self, points_camera: Floats) -> F64:
+        """Pixels (N, 2) as (x, y) of points (N, 3) [m]; NaN where z <= 0.
+
+        A bent lens's polynomial holds for what its image shows: NaN beyond the ray of the image's
+        farthest corner."""
+        if not self.bends:
+            return self.pinhole().project(points_camera)
+        x, y, z = np.asarray(points_camera, np.float64).T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            straight = np.column_stack([x, y]) / np.where(z > 0, z, np.nan)[:, None]
+            seen = np.hypot(*straight.T) <= _widest_tangent(self)
+        pixels = np.full(straight.shape, np.nan)
+        if seen.any():
+            pixels[seen] = self._bent(straight[seen])
+        return pixels
+
+    def _bent(self, straight: F64) -> F64:
+        """(N, 2) pixels of directions (N, 2) with z = 1."""
+        matrix, distortion = self.matrix(), np.array(self.distortion)
+        if self.model == "equidistant":
+            pixels = cv2.fisheye.distortPoints(straight[:, None], matrix, distortion)
+        else:
+            rays, still = np.column_stack([straight, np.ones(len(straight))]), np.zeros(3)
+            pixels, _ = cv2.projectPoints(rays, still, still, matrix, distortion)
+        return np.asarray(pixels, np.float64)[:, 0]
+
+
+@lru_cache(maxsize=16)
+def _widest_tangent(lens: Lens) -> float:
+    """Largest tangent of the angle between the optical axis and a ray through the image's edge."""
+    edge = [
+        (x, y)
+        for x in (-0.5, lens.intrinsics[2], lens.width - 0.5)
+        for y in (-0.5, lens.intrinsics[3], lens.height - 0.5)
+    ]
+    return float(np.hypot(*lens._rays(np.array(edge)).T[:2]).max())
 
 
 class Undistortion:

@@ -17,6 +17,7 @@ from airground.io.euroc import read_image_list, read_imu, read_magnetic
 from airground.io.header import Header, read_header
 from airground.io.image_files import ImageFiles, ImageSource, listed_files
 from airground.io.images import warm_up_images
+from airground.io.lens import Undistortion
 from airground.io.plausibility import (
     CAMERA_STEP_S,
     IMU_STEP_S,
@@ -66,19 +67,22 @@ class Recording(Pair):
                 mav_files=tuple(listed_files(path / layout.MAV_IMAGES, mav_names, mav_list)),
                 ground_colour_files=tuple(listed_files(path / "ground", colour_names, ground_list)),
                 ground_depth_files=tuple(listed_files(path / "ground", depth_names, ground_list)),
-                mav_camera=mav.camera.pinhole(),
-                ground_camera=ground.camera.pinhole(),
+                mav_camera=mav.camera.lens().pinhole(),
+                ground_camera=ground.camera.lens().pinhole(),
                 depth_units_per_m=ground.depth.units_per_m,
             )
             images.check_present()
             warm_up_images()  # so that no image waits for the compiler
         source = images
+        of_mav, of_ground = Undistortion(mav.camera.lens()), Undistortion(ground.camera.lens())
 
         def read_mav_image(index: int) -> MavImage:
-            return MavImage(int(mav_stamps[index]), source.mav(index))
+            return MavImage(int(mav_stamps[index]), of_mav.image(source.mav(index)))
 
         def read_ground_image(index: int) -> GroundImage:
-            return GroundImage(int(ground_stamps[index]), *source.ground(index))
+            colour, depth = source.ground(index)
+            straight = of_ground.image(colour), of_ground.depth(depth)
+            return GroundImage(int(ground_stamps[index]), *straight)
 
         recording = cls(
             _robot(path, Source.MAV, mav, mav_stamps, read_mav_image),

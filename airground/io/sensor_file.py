@@ -16,7 +16,7 @@ from airground.io.calibration import MAX_SIDE_PX
 from airground.io.euroc import read_lines
 from airground.io.header import shortened
 from airground.io.input_files import SETTINGS_LIMIT, read_toml_text
-from airground.io.lens import Lens, Model
+from airground.io.lens import COEFFICIENTS, MAX_READOUT_S, Lens, Model
 from airground.io.plausibility import rigid
 
 DISTORTION_MODELS: dict[str, Model] = {
@@ -28,11 +28,6 @@ DISTORTION_MODELS: dict[str, Model] = {
     "fisheye": "equidistant",
 }
 """Names of distortion models, as EuRoC, Kalibr, ROS and OpenCV write them."""
-COEFFICIENTS: dict[Model, tuple[int, ...]] = {
-    "radial-tangential": (4, 5, 8, 12, 14),
-    "equidistant": (4,),
-}
-"""How many coefficients a model can have, in OpenCV's order."""
 NO_DISTORTION = (None, "", "none")
 """How files say that images are free of distortion."""
 SYNONYMS = {"distortion_coefficients": "distortion_coeffs"}
@@ -47,8 +42,6 @@ DEPTH_UNITS, RATE = "depth_units_per_m", "rate_hz"
 """Keys of a calibration for the value of one metre of depth, and for folders without stamps."""
 READOUT = "readout_s"
 """Key of a camera that takes its rows one after the other."""
-MAX_READOUT_S = 0.1
-"""Rolling shutters take up to about 50 ms; a larger number is one of milliseconds."""
 
 
 _OF_WRONG_VALUES = (ValueError, LookupError, AttributeError, TypeError, OverflowError)

@@ -14,6 +14,8 @@ from sim.robots.motion import ROBOTS, Robot
 
 MIN_VIEWS = 2
 """Images that a track needs at least."""
+OPENCV_COEFFICIENTS, FULL_OPENCV_COEFFICIENTS = 4, 8
+"""Numbers of distortion coefficients of COLMAP's models, in OpenCV's order."""
 
 
 def write_colmap_folder(folder: Path, simulated: Simulated, robots: tuple[Robot, ...]) -> None:
@@ -39,10 +41,17 @@ def write_colmap_folder(folder: Path, simulated: Simulated, robots: tuple[Robot,
 
 
 def _camera_line(simulated: Simulated, robot: Robot) -> str:
-    camera = simulated.truth.camera(robot)
-    cx, cy = camera.cx + PIXEL_CENTRE, camera.cy + PIXEL_CENTRE
-    size = f"{camera.width} {camera.height}"
-    return f"{_camera_id(robot)} PINHOLE {size} {camera.fx!r} {camera.fy!r} {cx!r} {cy!r}"
+    lens = simulated.truth.lens(robot)
+    fx, fy, cx, cy = lens.intrinsics
+    model, distortion = "PINHOLE", lens.distortion
+    if lens.model == "equidistant":
+        model = "OPENCV_FISHEYE"
+    elif lens.bends:
+        model = "OPENCV" if len(distortion) == OPENCV_COEFFICIENTS else "FULL_OPENCV"
+        distortion += (0.0,) * (FULL_OPENCV_COEFFICIENTS - len(distortion)) * (model != "OPENCV")
+    numbers = fx, fy, cx + PIXEL_CENTRE, cy + PIXEL_CENTRE, *distortion
+    words = " ".join(map(repr, numbers))
+    return f"{_camera_id(robot)} {model} {lens.width} {lens.height} {words}"
 
 
 def _camera_id(robot: Robot) -> int:

@@ -121,10 +121,16 @@ def _robots(header: Header) -> list[str]:
         table = header.calibration.mav if robot == "mav" else header.calibration.ground
         camera = table.camera
         view = np.rad2deg(2 * np.arctan(camera.width / 2 / camera.fx))
+        if camera.distortion_model:
+            sides = camera.lens().rays()[round(camera.cy), [0, -1], 0]
+            view = np.rad2deg(np.ptp(np.arctan(sides)))
+        words = [f"{view:.0f} deg wide", camera.distortion_model]
+        words += [f"rolling shutter of {camera.readout_s * 1e3:g} ms"] if camera.readout_s else []
         rows.append(
             [
                 robot,
-                f"{camera.width} x {camera.height} at {camera.rate_hz:g} Hz, {view:.0f} deg wide",
+                f"{camera.width} x {camera.height} at {camera.rate_hz:g} Hz, "
+                + ", ".join(filter(None, words)),
                 "-" if robot == "mav" else "registered, 16 bit",
                 f"{table.imu.rate_hz:g} Hz",
                 f"{table.magnetometer.rate_hz:g} Hz",
@@ -138,7 +144,7 @@ def _noise(sensors: SensorPreset) -> list[str]:
     rows = [
         [kind, key, f"{np.round(value, 9)}"]
         for kind, values in asdict(sensors).items()
-        if isinstance(values, dict)
+        if isinstance(values, dict) and not kind.endswith("optics")
         for key, value in values.items()
     ]
     title = f"## Noise and calibration errors: {sensors.name}"

@@ -110,14 +110,15 @@ def _magnetic(simulated: Simulated, robot: Robot) -> Iterator[Message]:
 
 
 def _images(simulated: Simulated, robot: Robot) -> Iterator[Message]:
-    camera, frame = simulated.nominal(robot).camera.pinhole(), f"{robot}/{CAMERA}"
+    lens, frame = simulated.nominal(robot).camera.lens(), f"{robot}/{CAMERA}"
+    straight = simulated.sensed(robot).calibration.camera
     files, topic = simulated.image_files(robot), f"/{robot}/camera"
     for index, stamp in enumerate(simulated.stamps_ns(robot)):
-        yield stamp, f"{topic}/camera_info", ros.camera_info(stamp, frame, camera)
+        yield stamp, f"{topic}/camera_info", ros.camera_info(stamp, frame, lens, straight)
         image = ros.compressed_image(stamp, frame, files[index])
         yield stamp, f"{topic}/image_raw/compressed", image
         if robot == "ground":
-            depth = simulated.recording.ground.read_image(index).depth
+            _, depth = simulated.files.ground(index)
             yield stamp, f"{topic}/depth", ros.depth_image(stamp, frame, depth)
         T_world_camera = simulated.truth.T_world_camera(robot, stamp)
         yield stamp, f"/{robot}/truth/camera", ros.pose(stamp, WORLD, T_world_camera)

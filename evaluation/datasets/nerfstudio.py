@@ -10,15 +10,18 @@ from typing import Any
 import cv2
 import numpy as np
 
-from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
+from airground.io.lens import Lens
 from airground.io.ply import write_ply
 from evaluation.datasets.simulated import Simulated, copy_images
 from evaluation.datasets.views import PIXEL_CENTRE, View, choose_views
 from sim.robots.motion import Robot
 
 MM_PER_M = 1000.0
+RADTAN_KEYS = ("k1", "k2", "p1", "p2", "k3")
+FISHEYE_KEYS = ("k1", "k2", "k3", "k4")
+"""Keys of the distortion, in OpenCV's order of the coefficients."""
 T_CAMERA_OPENGL = SE3(np.diag([1.0, -1.0, -1.0]), np.zeros(3))
 
 
@@ -38,7 +41,7 @@ def write_nerfstudio_folder(folder: Path, simulated: Simulated, robots: tuple[Ro
         folder / "points.ply", PointCloud(views.cloud.points[seen], views.cloud.colours[seen])
     )
     content = {
-        **_intrinsics(simulated.truth.camera(robot)),
+        **_intrinsics(simulated.truth.lens(robot)),
         "ply_file_path": "points.ply",
         "frames": frames,
     }
@@ -46,17 +49,21 @@ def write_nerfstudio_folder(folder: Path, simulated: Simulated, robots: tuple[Ro
     (folder / "transforms.json").write_text(text, encoding="utf-8")
 
 
-def _intrinsics(camera: PinholeCamera) -> dict[str, Any]:
-    """OPENCV without distortion: the one model that all readers of this file know."""
+def _intrinsics(lens: Lens) -> dict[str, Any]:
+    """OPENCV, which all readers of this file know, or OPENCV_FISHEYE."""
+    fx, fy, cx, cy = lens.intrinsics
+    fisheye = lens.model == "equidistant"
+    names = FISHEYE_KEYS if fisheye else RADTAN_KEYS
     return {
-        "camera_model": "OPENCV",
-        "w": camera.width,
-        "h": camera.height,
-        "fl_x": camera.fx,
-        "fl_y": camera.fy,
-        "cx": camera.cx + PIXEL_CENTRE,
-        "cy": camera.cy + PIXEL_CENTRE,
-        **dict.fromkeys(("k1", "k2", "p1", "p2"), 0.0),
+        "camera_model": "OPENCV_FISHEYE" if fisheye else "OPENCV",
+        "w": lens.width,
+        "h": lens.height,
+        "fl_x": fx,
+        "fl_y": fy,
+        "cx": cx + PIXEL_CENTRE,
+        "cy": cy + PIXEL_CENTRE,
+        **dict.fromkeys(names[:4], 0.0),
+        **dict(zip(names, lens.distortion, strict=False)),
     }
 
 
@@ -69,6 +76,7 @@ def _frame(view: View) -> dict[str, Any]:
 
 
 def _write_depth(path: Path, simulated: Simulated, view: View) -> None:
-    depth_mm = np.nan_to_num(simulated.recording.ground.read_image(view.index).depth) * MM_PER_M
+    _, depth = simulated.files.ground(view.index)
+    depth_mm = np.nan_to_num(depth) * MM_PER_M
     if not cv2.imwrite(str(path), np.rint(depth_mm).astype(np.uint16)):
         raise OSError(f"{path}: cannot be written")

@@ -14,11 +14,13 @@ from rosbags.typesys import Stores, get_typestore
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.io.calibration import ImuTable, MagnetometerTable
+from airground.io.lens import Lens
 
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
 UNKNOWN = -1.0
 """REP 145: a covariance that begins so says that the quantity is not measured."""
 SECOND_NS = 1_000_000_000
+PLUMB_BOB_COEFFICIENTS = 5
 
 
 def make(kind: str, **fields: Any) -> Any:
@@ -57,19 +59,24 @@ def depth_image(stamp_ns: int, frame: str, depth: NDArray[np.float32]) -> Any:
     )
 
 
-def camera_info(stamp_ns: int, frame: str, camera: PinholeCamera) -> Any:
-    """A camera without distortion; as in OpenCV, integer pixels are pixel centres."""
-    matrix = camera.matrix()
+def camera_info(stamp_ns: int, frame: str, lens: Lens, straight: PinholeCamera) -> Any:
+    """A lens and the camera of its rectified images; as in OpenCV, integer pixels are centres."""
+    matrix = lens.matrix()
+    distortion = np.zeros(PLUMB_BOB_COEFFICIENTS)
+    if lens.model == "equidistant":
+        distortion = np.array(lens.distortion)
+    else:
+        distortion[: len(lens.distortion)] = lens.distortion
     return make(
         "sensor_msgs/msg/CameraInfo",
         header=header(stamp_ns, frame),
-        height=camera.height,
-        width=camera.width,
-        distortion_model="plumb_bob",
-        d=np.zeros(5),
+        height=lens.height,
+        width=lens.width,
+        distortion_model="equidistant" if lens.model == "equidistant" else "plumb_bob",
+        d=distortion,
         k=matrix.ravel(),
         r=np.eye(3).ravel(),
-        p=np.hstack([matrix, np.zeros((3, 1))]).ravel(),
+        p=np.hstack([straight.matrix(), np.zeros((3, 1))]).ravel(),
         binning_x=0,
         binning_y=0,
         roi=make(

@@ -9,10 +9,10 @@ import numpy as np
 import open3d as o3d
 from numpy.typing import NDArray
 
-from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
-from airground.core.messages import GroundImage
 from airground.core.se3 import SE3
+from airground.errors import InputError
+from airground.io.lens import Lens
 from evaluation.datasets.simulated import Simulated
 from sim.recording.true_surface import TrueSurface
 from sim.robots.motion import Robot
@@ -68,8 +68,18 @@ class Views:
 
 
 def choose_views(simulated: Simulated, robots: tuple[Robot, ...]) -> Views:
-    """Every tenth image of each robot."""
+    """Every tenth image of each robot.
+
+    Raises:
+        InputError: A camera has a rolling shutter: its images have no single pose.
+    """
     truth = simulated.truth
+    for robot in robots:
+        if truth.lens(robot).readout_s:
+            raise InputError(
+                f"{simulated.recording.path}: the {robot} camera has a rolling shutter; COLMAP and "
+                "Nerfstudio know one pose an image"
+            )
     sampled = truth.surface(robots[-1])
     cloud = sample_surface(sampled, POINTS)
     points = cloud.points.astype(np.float64)
@@ -77,16 +87,16 @@ def choose_views(simulated: Simulated, robots: tuple[Robot, ...]) -> Views:
     coloured = np.zeros(len(points), bool)
     views = []
     for robot in robots:
-        camera, surface = truth.camera(robot), truth.surface(robot)
+        lens, surface = truth.lens(robot), truth.surface(robot)
         # In a world that changes, a robot may see no surface at a point of the other's.
         there = surface is sampled or surface.distance(points) < ON_SURFACE_M
         for index, stamp_ns in list(enumerate(simulated.stamps_ns(robot)))[::EVERY]:
             T_world_camera = truth.T_world_camera(robot, stamp_ns)
-            seen = _seen_by(surface, camera, T_world_camera, points, there)
+            seen = _seen_by(surface, lens, T_world_camera, points, there)
             new = ~coloured[seen.indices]
             if new.any():
-                image = simulated.sensed(robot).read_image(index)
-                pixels = image.colour if isinstance(image, GroundImage) else image.image
+                files = simulated.files
+                pixels = files.mav(index) if robot == "mav" else files.ground(index)[0]
                 colours[seen.indices[new]] = _colours_at(pixels, seen.pixels[new])
                 coloured[seen.indices] = True
             file = simulated.image_files(robot)[index]
@@ -113,16 +123,16 @@ def sample_surface(surface: TrueSurface, count: int) -> PointCloud:
 
 def _seen_by(
     surface: TrueSurface,
-    camera: PinholeCamera,
+    lens: Lens,
     T_world_camera: SE3,
     points_world: NDArray,
     there: NDArray[np.bool_] | bool,
 ) -> Seen:
     """The points (N, 3) that are there, lie in the image and are not hidden by the surface."""
-    pixels = camera.project(T_world_camera.inverse() @ points_world)
+    pixels = lens.project(T_world_camera.inverse() @ points_world)
     x, y = pixels.T
     with np.errstate(invalid="ignore"):
-        inside = (x > -0.5) & (x < camera.width - 0.5) & (y > -0.5) & (y < camera.height - 0.5)
+        inside = (x > -0.5) & (x < lens.width - 0.5) & (y > -0.5) & (y < lens.height - 0.5)
     indices = np.flatnonzero(inside & there)
     origin = T_world_camera.translation
     rays = np.empty((len(indices), 6), np.float32)

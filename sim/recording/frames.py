@@ -10,18 +10,19 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from airground.core.se3 import SE3
 from airground.io import layout
 from airground.io.calibration import CalibrationTable, RobotTable
 from airground.io.digests import bytes_digest
+from airground.io.lens import Lens
 from airground.io.recording_writer import ground_image_name, mav_image_name
 from sim.geometry.edges import Edges
 from sim.recording.carried_lamp import CarriedLamp
 from sim.recording.render import Renderer
-from sim.recording.smooth_edges import smooth_edges
+from sim.recording.robot_view import RobotView
 from sim.robots.motion import ROBOTS, Motion, Robot
 from sim.sensors.camera import ImageSensor
 from sim.sensors.depth import kinect_depth
+from sim.sensors.pixel_rays import PixelRays
 from sim.sensors.presets import SensorPreset
 
 # Noise does not compress: the fastest settings, half the time of the default ones.
@@ -92,24 +93,29 @@ class FrameMaker:
         # One world that both robots see is loaded once.
         edges = {files: Edges.load(files.edges) for files in plan.worlds.values()}
         renderers = {files: _renderer(files) for files in edges}
-        self._edges = {robot: edges[files] for robot, files in plan.worlds.items()}
-        self._renderers = {robot: renderers[files] for robot, files in plan.worlds.items()}
-        self._unlit = None if plan.unlit is None else _renderer(plan.unlit)
+        self._renderers = list(renderers.values())
+        self._views = {
+            robot: self._view(robot, renderers[files], edges[files])
+            for robot, files in plan.worlds.items()
+        }
+        self._unlit: RobotView | None = None
+        if plan.unlit is not None:
+            self._renderers.append(_renderer(plan.unlit))
+            of_drive = edges[plan.worlds["ground"]]
+            self._unlit = self._view("ground", self._renderers[-1], of_drive)
+        self._pixels = {robot: PixelRays.of(self._lens(robot)) for robot in ROBOTS}
         self._sensors: dict[Robot, ImageSensor] = {}
         if plan.preset.image is not None:
             for number, robot in enumerate(ROBOTS, start=1):
-                camera = self._table(robot).camera.pinhole()
                 rng = np.random.default_rng([*plan.seeds, number])
-                self._sensors[robot] = ImageSensor.of(camera, plan.preset.image, rng)
+                self._sensors[robot] = ImageSensor.of(self._pixels[robot], plan.preset.image, rng)
 
     def __enter__(self) -> FrameMaker:
         return self
 
     def __exit__(self, *_: object) -> None:
-        for renderer in set(self._renderers.values()):
+        for renderer in self._renderers:
             renderer.close()
-        if self._unlit is not None:
-            self._unlit.close()
 
     def make(self, robot: Robot, index: int) -> list[Written]:
         """Write the files of one frame."""
@@ -126,10 +132,7 @@ class FrameMaker:
     def mav(self, index: int) -> NDArray[np.uint8]:
         """(height, width) grey image of the MAV."""
         time_ns, rng = self._start("mav", index)
-        T_world_camera = self._motion.camera_pose("mav", time_ns)
-        colour, depth = self._renderers["mav"].draw("mav", T_world_camera)
-        grey = cv2.cvtColor(colour, cv2.COLOR_RGB2GRAY)[..., None]
-        grey = self._smooth("mav", grey, depth, T_world_camera)
+        grey, depth = self._views["mav"].draw(time_ns)
         if "mav" in self._sensors:
             grey = self._expose("mav", grey, depth, time_ns, rng)
         return np.asarray(grey[..., 0], np.uint8)
@@ -137,19 +140,17 @@ class FrameMaker:
     def ground(self, index: int) -> tuple[NDArray[np.uint8], NDArray[np.uint16]]:
         """(height, width, 3) RGB and (height, width) depth as PNG values, of the ground robot."""
         time_ns, rng = self._start("ground", index)
-        T_world_camera = self._motion.camera_pose("ground", time_ns)
-        colour, depth = self._renderers["ground"].draw("ground", T_world_camera)
-        colour = self._smooth("ground", colour, depth, T_world_camera)
+        colour, depth = self._views["ground"].draw(time_ns)
         if self._unlit is not None and self._plan.lamp is not None:
-            unlit, _ = self._unlit.draw("ground", T_world_camera)
-            unlit = self._smooth("ground", unlit, depth, T_world_camera)
-            rays = self._table("ground").camera.pinhole().rays()
-            colour = self._plan.lamp.lit(colour, unlit, depth, rays)
+            unlit, _ = self._unlit.draw(time_ns)
+            colour = self._plan.lamp.lit(colour, unlit, depth, self._lens("ground").rays())
         if "ground" in self._sensors:
             colour = self._expose("ground", colour, depth, time_ns, rng)
+        delay_ns = self._plan.true.ground.depth.delay_ns
+        if delay_ns:
+            _, depth = self._views["ground"].draw(time_ns + delay_ns)
         if self._plan.preset.depth is not None:
-            camera = self._table("ground").camera.pinhole()
-            depth = kinect_depth(depth, camera, self._plan.preset.depth, rng)
+            depth = kinect_depth(depth, self._pixels["ground"], self._plan.preset.depth, rng)
         return colour, self._depth_units(depth)
 
     def _start(self, robot: Robot, index: int) -> tuple[int, np.random.Generator]:
@@ -160,11 +161,9 @@ class FrameMaker:
         rng = np.random.default_rng([*self._plan.seeds, ROBOTS.index(robot) + 1, index + 1])
         return stamp + self._table(robot).camera.time_offset_ns, rng
 
-    def _smooth(
-        self, robot: Robot, picture: NDArray, depth: NDArray, T_world_camera: SE3
-    ) -> NDArray[np.uint8]:
-        camera = self._table(robot).camera.pinhole()
-        return smooth_edges(picture, depth, camera, T_world_camera, self._edges[robot])
+    def _view(self, robot: Robot, renderer: Renderer, edges: Edges) -> RobotView:
+        lens, grey = self._lens(robot), robot == "mav"
+        return RobotView(robot, lens, self._motion, renderer, edges, grey)
 
     def _expose(
         self, robot: Robot, sharp: NDArray, depth: NDArray, time_ns: int, rng: np.random.Generator
@@ -186,6 +185,9 @@ class FrameMaker:
         data = encoded.tobytes()
         (self._plan.recording / folder / name).write_bytes(data)
         return Written(folder, name, bytes_digest(data))
+
+    def _lens(self, robot: Robot) -> Lens:
+        return self._table(robot).camera.lens()
 
     def _table(self, robot: Robot) -> RobotTable:
         return self._plan.true.mav if robot == "mav" else self._plan.true.ground

@@ -21,6 +21,7 @@ from airground.errors import AirgroundError, InputError
 from airground.io import recording_writer
 from airground.io.header import FrameCounts, Header
 from airground.io.images import metric_depth
+from airground.io.lens import Lens
 from airground.io.recording import Recording
 from sim.geometry.edges import find_edges
 from sim.partial_folder import partial_folder
@@ -29,7 +30,8 @@ from sim.recording.frame_pool import FrameServer, make_frames
 from sim.recording.frames import FramePlan, WorldFiles
 from sim.recording.render import with_cameras
 from sim.recording.truth import write_truth
-from sim.robots.motion import RATE_HZ, Robot, simulate_motion
+from sim.recording.view_tiles import tiles_of
+from sim.robots.motion import RATE_HZ, Motion, Robot, simulate_motion
 from sim.robots.robot_motion import RobotMotion
 from sim.scene import Scene
 from sim.sensors.imu import measure_field, measure_imu
@@ -161,7 +163,8 @@ def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan]
         scene.mav.camera_f_px, motion.mav.mounting, motion.ground.mounting, preset, calibration_rng
     )
     stamps = {
-        robot: image_stamps(motion.stamps_ns, first) for robot, first in FIRST_IMAGE_NS.items()
+        robot: _within(motion, image_stamps(motion.stamps_ns, first), preset)
+        for robot, first in FIRST_IMAGE_NS.items()
     }
     recording_writer.make_folders(root)
     write_truth(root, world, flown, motion, sensors.true)
@@ -216,8 +219,12 @@ def _store_models(plan: FramePlan, flight: Flight) -> None:
 
 
 def _store_model(plan: FramePlan, files: WorldFiles, world: World) -> None:
-    true = plan.true
-    cameras = {"mav": true.mav.camera.pinhole(), "ground": true.ground.camera.pinhole()}
+    lenses: dict[Robot, Lens] = {
+        "mav": plan.true.mav.camera.lens(),
+        "ground": plan.true.ground.camera.lens(),
+    }
+    tiles = [tile for robot, lens in lenses.items() for tile in tiles_of(robot, lens)]
+    cameras = {tile.name: tile.camera for tile in tiles}
     model = with_cameras(world.spec, cameras)
     # MuJoCo only prints a warning when the disk is full.
     if shutil.disk_usage(plan.recording).free < mujoco.mj_sizeModel(model):
@@ -233,6 +240,17 @@ def image_stamps(motion_stamps_ns: NDArray[np.int64], first_ns: int) -> NDArray[
     if count == 0:
         raise InputError(f"duration_s must be at least {(first_ns + _MARGIN_NS) * 1e-9} s")
     return first_ns + np.rint(np.arange(count) * (1e9 / CAMERA_RATE_HZ)).astype(np.int64)
+
+
+def _within(
+    motion: Motion, stamps_ns: NDArray[np.int64], preset: SensorPreset
+) -> NDArray[np.int64]:
+    """The stamps whose rows, exposures and depth images end before the motion does."""
+    readout_s = max(preset.mav_optics.readout_s, preset.ground_optics.readout_s)
+    exposure_s = preset.image.exposure_s if preset.image else 0.0
+    clock_ns = preset.calibration.time_offset_ns if preset.calibration else 0
+    reach_ns = round((readout_s + exposure_s) * 0.5e9) + clock_ns + preset.depth_delay_ns
+    return stamps_ns[stamps_ns + reach_ns <= motion.stamps_ns[-1]]
 
 
 def _samples(

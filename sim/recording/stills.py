@@ -18,6 +18,7 @@ from sim.robots.motion import ROBOTS, Robot
 from sim.sensors.camera import ImageSensor
 from sim.sensors.depth import kinect_depth
 from sim.sensors.miscalibration import GROUND_FOCAL_PX, GROUND_IMAGE_PX, MAV_IMAGE_PX
+from sim.sensors.pixel_rays import PixelRays
 from sim.sensors.presets import SensorPreset
 from sim.world.world import World
 
@@ -56,7 +57,9 @@ class Stills:
         }
         self._sensors, self._rng = sensors, rng
         self._faults = {
-            robot: None if sensors.image is None else ImageSensor.of(camera, sensors.image, rng)
+            robot: None
+            if sensors.image is None
+            else ImageSensor.of(PixelRays(camera), sensors.image, rng)
             for robot, camera in self._cameras.items()
         }
         self._edges = find_edges((world.vertices, world.triangles), world.terrain)
@@ -83,7 +86,7 @@ class Stills:
         if faults is not None:
             grey = faults.expose(grey, depth, SE3.identity(), 0.0, self._rng)
         if self._sensors.depth is not None:
-            depth = kinect_depth(depth, camera, self._sensors.depth, self._rng)
+            depth = kinect_depth(depth, PixelRays(camera), self._sensors.depth, self._rng)
         return Still(camera, T_world_camera, grey[..., 0], depth)
 
 

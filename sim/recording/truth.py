@@ -18,16 +18,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.errors import RecordingError
 from airground.io.calibration import CalibrationTable, RobotTable
 from airground.io.header import parse_table, read_toml, write_toml
 from airground.io.layout import TRUTH
+from airground.io.lens import Lens
 from airground.io.tum import write_tum
 from sim.geometry.box import Box
 from sim.geometry.changes import Change
+from sim.recording.row_poses import RowPoses, exact_row_poses
 from sim.recording.true_surface import TrueSurface
 from sim.robots.motion import ROBOTS, Motion, Robot
 from sim.world.world import World
@@ -70,9 +71,14 @@ class Truth:
     def sensors(self, robot: Robot) -> RobotTable:
         return self.calibration.mav if robot == "mav" else self.calibration.ground
 
-    def camera(self, robot: Robot) -> PinholeCamera:
-        """True intrinsics."""
-        return self.sensors(robot).camera.pinhole()
+    def lens(self, robot: Robot) -> Lens:
+        """True intrinsics, distortion and shutter of a camera."""
+        return self.sensors(robot).camera.lens()
+
+    def row_poses(self, robot: Robot, stamp_ns: int) -> RowPoses:
+        """`T_world_camera` of every row of the image with a stamp [ns]."""
+        middle_ns = stamp_ns + self.sensors(robot).camera.time_offset_ns
+        return exact_row_poses(self.motion, robot, self.lens(robot), middle_ns)
 
     def surface(self, robot: Robot) -> TrueSurface:
         """The true surface of the world that a robot sees."""
@@ -85,10 +91,12 @@ class Truth:
         return {"ground": seen, "mav": _mav_surface(self.folder) if changed else seen}
 
     def depth(self, robot: Robot, stamp_ns: int) -> NDArray[np.float32]:
-        """(height, width) true depth [m] of the frame with this stamp, NaN for nothing.
-        For the true intrinsics; z along the optical axis.
+        """(height, width) true depth [m] of the frame with this stamp, NaN for nothing: of every
+        pixel's own ray, along the optical axis of its row's own pose.
         """
-        return self.surface(robot).cast(self.camera(robot), self.T_world_camera(robot, stamp_ns))
+        rays = self.row_poses(robot, stamp_ns).rays_world(self.lens(robot).rays())
+        depth = self.surface(robot).scene.cast_rays(rays)["t_hit"].numpy()
+        return np.where(np.isfinite(depth), depth, np.float32(np.nan))
 
 
 def write_truth(

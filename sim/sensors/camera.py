@@ -9,9 +9,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from sim.sensors.hashed_noise import gaussian, noise_key
+from sim.sensors.pixel_rays import PixelRays
 from sim.sensors.presets import ImageNoise
 
 MAX_SAMPLES = 32
@@ -49,25 +49,26 @@ class ImageSensor:
     """One camera with its faults.
 
     Attributes:
-        camera: True intrinsics of the camera.
+        rays: Where the camera's pixels look.
         noise: Size of the faults.
         drift: Exposure over time.
         vignette: (height, width) float32 factor on the light, 1 in the middle.
     """
 
-    camera: PinholeCamera
+    rays: PixelRays
     noise: ImageNoise
     drift: ExposureDrift
     vignette: NDArray[np.float32]
 
     @classmethod
-    def of(cls, camera: PinholeCamera, noise: ImageNoise, rng: np.random.Generator) -> ImageSensor:
+    def of(cls, rays: PixelRays, noise: ImageNoise, rng: np.random.Generator) -> ImageSensor:
+        camera = rays.camera
         x = np.arange(camera.width) - (camera.width - 1) / 2
         y = np.arange(camera.height) - (camera.height - 1) / 2
         squared = x[None, :] ** 2 + y[:, None] ** 2
         vignette = 1 - noise.vignetting * squared / squared.max()
         drift = ExposureDrift.draw(noise.exposure_drift, rng)
-        return cls(camera, noise, drift, vignette.astype(np.float32))
+        return cls(rays, noise, drift, vignette.astype(np.float32))
 
     def expose(
         self,
@@ -82,8 +83,8 @@ class ImageSensor:
         Args:
             sharp: (height, width, channels) a perfect picture at the middle of the exposure.
             depth: (height, width) [m], NaN where there is nothing.
-            T_start_end: Motion of the camera during the exposure: its pose at the end in
-                its frame at the start.
+            T_start_end: Motion of the camera during the exposure of the middle row: its pose at
+                the end in its frame at the start.
             time_s: Time of the exposure, for the gain [s].
             rng: For the noise.
 
@@ -94,7 +95,7 @@ class ImageSensor:
         keys = np.array([noise_key(rng) for _ in planes], np.uint64)
         exposed = _expose(
             np.stack(planes),
-            *_motion_terms(depth, self.camera, T_start_end),
+            pixel_motion(depth, self.rays, T_start_end),
             self.vignette,
             np.float32(self.drift.gain(time_s)),
             np.float32(self.noise.read_noise**2),
@@ -104,14 +105,21 @@ class ImageSensor:
         return np.asarray(cv2.merge(list(exposed)), np.uint8).reshape(sharp.shape)
 
 
-def _motion_terms(
-    depth: NDArray[np.float32], camera: PinholeCamera, T_start_end: SE3
-) -> tuple[NDArray[np.float32], NDArray, NDArray, NDArray[np.float32], NDArray[np.float32]]:
-    """Depth, x / z of every column, y / z of every row, focal lengths, and the twist."""
+def pixel_motion(
+    depth: NDArray[np.float32], rays: PixelRays, T_start_end: SE3
+) -> NDArray[np.float32]:
+    """(2, height, width) motion of each pixel's scene point along columns and rows [px]."""
+    motion = np.empty((2, *depth.shape), np.float32)
+    twist = T_start_end.log().astype(np.float32)
+    if rays.bent is not None:
+        _lens_motion(depth, rays.bent, twist, motion)
+        return motion
+    camera = rays.camera
     fx, fy, cx, cy = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
     x_rays = (np.arange(camera.width) - np.float64(cx)) / np.float64(fx)
     y_rays = (np.arange(camera.height) - np.float64(cy)) / np.float64(fy)
-    return depth, x_rays, y_rays, np.array([fx, fy]), T_start_end.log().astype(np.float32)
+    _pinhole_motion(depth, x_rays, y_rays, np.array([fx, fy]), twist, motion)
+    return motion
 
 
 # Each loop below does one kind of work along a row, and has no branch: so the compiler
@@ -135,23 +143,46 @@ def _row_motion(depth, x_rays, y, focal_px, twist, mx, my):  # type: ignore[no-u
 
 
 @njit(cache=True, error_model="numpy")
-def _expose(  # type: ignore[no-untyped-def]
-    planes, depth, x_rays, y_rays, focal_px, twist, vignette, gain, read, shot, keys
-):
+def _pinhole_motion(depth, x_rays, y_rays, focal_px, twist, motion):  # type: ignore[no-untyped-def]
+    for row in range(len(depth)):
+        _row_motion(
+            depth[row], x_rays, y_rays[row], focal_px, twist, motion[0, row], motion[1, row]
+        )
+
+
+@njit(cache=True, error_model="numpy")
+def _lens_motion(depth, bent, twist, motion):  # type: ignore[no-untyped-def]
+    """As `_row_motion`, with a ray and a derivative for each pixel."""
+    vx, vy, vz, wx, wy, wz = twist
+    height, width = depth.shape
+    for row in range(height):
+        for column in range(width):
+            x, y = bent[0, row, column], bent[1, row, column]
+            inverse = np.float32(1) / depth[row, column]
+            inverse = inverse if inverse > 0 else np.float32(0)
+            dx = -vx * inverse - (wy - wz * y)
+            dy = -vy * inverse - (wz * x - wx)
+            dz = -vz * inverse - (wx * y - wy * x)
+            dx, dy = dx - x * dz, dy - y * dz
+            motion[0, row, column] = bent[2, row, column] * dx + bent[3, row, column] * dy
+            motion[1, row, column] = bent[4, row, column] * dx + bent[5, row, column] * dy
+
+
+@njit(cache=True, error_model="numpy")
+def _expose(planes, motion, vignette, gain, read, shot, keys):  # type: ignore[no-untyped-def]
     """(channels, height, width): each pixel's mean along its motion, with all faults."""
     channels, height, width = planes.shape
     quads = np.empty((channels, height * width), np.uint32)
     for channel in range(channels):
         _pack_quads(planes[channel], quads[channel])
     image = np.empty_like(planes)
-    mx, my = np.empty(width, np.float32), np.empty(width, np.float32)
     samples, step = np.empty(width, np.float32), np.empty(width, np.float32)
     along = np.empty(width, np.float32)
     ax, ay = np.empty(width, np.float32), np.empty(width, np.float32)
     index, corners = np.empty(width, np.int32), np.empty(width, np.uint32)
     light = np.empty((channels, width), np.float32)
     for row in range(height):
-        _row_motion(depth[row], x_rays, y_rays[row], focal_px, twist, mx, my)
+        mx, my = motion[0, row], motion[1, row]
         most = _sampling(mx, my, samples, step, along)
         light[:] = 0
         for sample in range(most):

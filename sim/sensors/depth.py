@@ -13,8 +13,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from airground.core.camera import PinholeCamera
 from sim.sensors.hashed_noise import gaussian, noise_key
+from sim.sensors.pixel_rays import PixelRays
 from sim.sensors.presets import DepthNoise
 
 BASELINE_M = 0.075
@@ -24,13 +24,13 @@ _PATCH_PX = 16  # whole patches of a surface seen at a grazing angle vanish toge
 
 
 def kinect_depth(
-    depth: NDArray[np.float32], camera: PinholeCamera, noise: DepthNoise, rng: np.random.Generator
+    depth: NDArray[np.float32], rays: PixelRays, noise: DepthNoise, rng: np.random.Generator
 ) -> NDArray[np.float32]:
     """What a Kinect would measure.
 
     Args:
         depth: (height, width) true depth along the optical axis [m], NaN for nothing.
-        camera: True intrinsics of the camera that depth is registered to.
+        rays: Where the pixels look of the camera that depth is registered to.
         noise: Size of the faults.
         rng: Source of randomness.
 
@@ -38,8 +38,8 @@ def kinect_depth(
         (height, width) float32 [m], NaN where missing.
     """
     height, width = depth.shape
-    incidence = incidence_angles(depth, camera)
-    shadow = projector_shadow(depth, camera.fx * BASELINE_M)
+    incidence = incidence_angles(depth, rays)
+    shadow = projector_shadow(depth, rays.camera.fx * BASELINE_M)
     parameters = np.array(
         [
             noise.axial_scale,
@@ -77,12 +77,14 @@ def patch_noise(height: int, width: int, rng: np.random.Generator) -> NDArray:
     return cv2.resize(coarse, (width, height), interpolation=cv2.INTER_LINEAR)
 
 
-def incidence_angles(depth: NDArray[np.float32], camera: PinholeCamera) -> NDArray[np.float32]:
+def incidence_angles(depth: NDArray[np.float32], rays: PixelRays) -> NDArray[np.float32]:
     """(height, width) angle between each ray and the surface's normal [rad], NaN at holes."""
+    camera = rays.camera
     fx, fy, cx, cy = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
     x_rays = (np.arange(camera.width, dtype=np.float32) - cx) / fx
     y_rays = (np.arange(camera.height, dtype=np.float32) - cy) / fy
-    return _incidence_angles(depth, x_rays, y_rays, np.array([fx, fy]))
+    bent = np.zeros((6, 0, 0), np.float32) if rays.bent is None else rays.bent
+    return _incidence_angles(depth, x_rays, y_rays, np.array([fx, fy]), bent)
 
 
 # Each loop below does one kind of work along a row, and most have no branch: so the compiler
@@ -90,7 +92,7 @@ def incidence_angles(depth: NDArray[np.float32], camera: PinholeCamera) -> NDArr
 
 
 @njit(cache=True, error_model="numpy")
-def _incidence_angles(depth, x_rays, y_rays, focal_px):  # type: ignore[no-untyped-def]
+def _incidence_angles(depth, x_rays, y_rays, focal_px, bent):  # type: ignore[no-untyped-def]
     """Normals from the slopes of inverse depth, which is linear in the pixel on a plane.
 
     On each axis the smaller of the two one-sided slopes is taken, so that silhouettes do
@@ -109,7 +111,10 @@ def _incidence_angles(depth, x_rays, y_rays, focal_px):  # type: ignore[no-untyp
         _smaller_slopes(here[:-2], here[1:-1], here[2:], False, False, slope_x[1:-1])
         _smaller_slopes(here[:1], here[:1], here[1:2], True, False, slope_x[:1])
         _smaller_slopes(here[-2:-1], here[-1:], here[-1:], False, True, slope_x[-1:])
-        _cosines(here, slope_x, slope_y, x_rays, y_rays[row], focal_px, cosines)
+        if bent.size == 0:
+            _cosines(here, slope_x, slope_y, x_rays, y_rays[row], focal_px, cosines)
+        else:
+            _bent_cosines(here, slope_x, slope_y, bent[:, row], cosines)
         angles[row] = np.arccos(cosines)
     return angles
 
@@ -133,6 +138,19 @@ def _cosines(inverse, slope_x, slope_y, x_rays, y, focal_px, cosines):  # type: 
         # The plane n . X = 1 has 1/z = n . ray, with ray = ((u-cx)/fx, (v-cy)/fy, 1).
         x = x_rays[column]
         nx, ny = slope_x[column] * fx, slope_y[column] * fy
+        nz = inverse[column] - nx * x - ny * y
+        length = np.sqrt((nx * nx + ny * ny + nz * nz) * (x * x + y * y + one))
+        cosines[column] = min(inverse[column] / length, one)
+
+
+@njit(cache=True, error_model="numpy")
+def _bent_cosines(inverse, slope_x, slope_y, bent, cosines):  # type: ignore[no-untyped-def]
+    """As `_cosines`, with a ray and a derivative for each pixel."""
+    one = np.float32(1)
+    for column in range(len(inverse)):
+        x, y = bent[0, column], bent[1, column]
+        nx = slope_x[column] * bent[2, column] + slope_y[column] * bent[4, column]
+        ny = slope_x[column] * bent[3, column] + slope_y[column] * bent[5, column]
         nz = inverse[column] - nx * x - ny * y
         length = np.sqrt((nx * nx + ny * ny + nz * nz) * (x * x + y * y + one))
         cosines[column] = min(inverse[column] / length, one)

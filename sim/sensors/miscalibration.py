@@ -18,6 +18,7 @@ from airground.io.calibration import (
     pose_rows,
 )
 from sim.robots.robot_motion import Mounting
+from sim.sensors.optics import EUROC_RADTAN, KINECT_RADTAN, misjudged
 from sim.sensors.presets import ADIS16448, NOMINAL, CalibrationErrors, ImuNoise, SensorPreset
 
 CAMERA_RATE_HZ = 30.0
@@ -46,8 +47,8 @@ def calibrate(
 ) -> Calibrations:
     """Draw the errors of a preset.
 
-    The cameras are as in the scene, with another nominal focal length and mounting; clocks and
-    depth scale have their design values nominally, and other true values.
+    The cameras are as in the scene and the preset, with another nominal focal length, distortion
+    and mounting; clocks and depth scale have their design values nominally, and other true values.
 
     Args:
         mav_focal_px: True focal length of the MAV's camera [px].
@@ -57,38 +58,54 @@ def calibrate(
     """
     errors = preset.calibration or CalibrationErrors(0.0, 0.0, 0, 0.0)
     signs = rng.choice([-1.0, 1.0], 5)
+    axes = rng.standard_normal((2, 3))
+    bent = rng.choice([-1.0, 1.0], 2)
     imu, magnetometer = _imu_table(preset.imu), _magnetometer_table(preset)
+    robots = (
+        (mav, _camera(MAV_IMAGE_PX, mav_focal_px), preset.mav_optics, EUROC_RADTAN),
+        (ground, _camera(GROUND_IMAGE_PX, GROUND_FOCAL_PX), preset.ground_optics, KINECT_RADTAN),
+    )
     tables = []
-    for mounting, size, focal, sign, clock in (
-        (mav, MAV_IMAGE_PX, mav_focal_px, signs[0], signs[1]),
-        (ground, GROUND_IMAGE_PX, GROUND_FOCAL_PX, signs[2], signs[3]),
-    ):
+    for number, (mounting, pinhole, optics, radtan) in enumerate(robots):
+        focal, clock = signs[2 * number], signs[2 * number + 1]
+        lens = optics.applied_to(pinhole, radtan)
         offset_ns = int(clock * errors.time_offset_ns)
-        axis = rng.standard_normal(3)
+        true_camera = lens.model_copy(update={"time_offset_ns": offset_ns})
+        nominal_camera = misjudged(
+            lens, 1 + focal * errors.focal, 1 + bent[number] * errors.distortion
+        )
+        axis = axes[number]
         turn = SE3.from_rotation_vector(errors.camera_to_imu * axis / np.linalg.norm(axis))
         true, nominal = (
             RobotTable(
                 T_body_imu=pose_rows(mounting.T_body_imu),
                 T_imu_camera=pose_rows(T_imu_camera),
-                camera=_camera(size, focal_px, time_offset_ns),
+                camera=camera,
                 imu=imu,
                 magnetometer=magnetometer,
             )
-            for T_imu_camera, focal_px, time_offset_ns in (
-                (mounting.T_imu_camera, focal, offset_ns),
-                (mounting.T_imu_camera @ turn, focal * (1 + sign * errors.focal), 0),
+            for T_imu_camera, camera in (
+                (mounting.T_imu_camera, true_camera),
+                (mounting.T_imu_camera @ turn, nominal_camera),
             )
         )
         tables.append((true, nominal))
     scale = 1 + signs[4] * errors.depth_scale
     (mav_true, mav_nominal), (ground_true, ground_nominal) = tables
     return Calibrations(
-        CalibrationTable(mav=mav_true, ground=_with_depth(ground_true, DEPTH_UNITS_PER_M * scale)),
-        CalibrationTable(mav=mav_nominal, ground=_with_depth(ground_nominal, DEPTH_UNITS_PER_M)),
+        CalibrationTable(
+            mav=mav_true,
+            ground=_with_depth(ground_true, DEPTH_UNITS_PER_M * scale, preset.depth_delay_ns),
+        ),
+        CalibrationTable(
+            mav=mav_nominal,
+            ground=_with_depth(ground_nominal, DEPTH_UNITS_PER_M, preset.depth_delay_ns),
+        ),
     )
 
 
-def _camera(size: tuple[int, int], focal_px: float, time_offset_ns: int) -> CameraTable:
+def _camera(size: tuple[int, int], focal_px: float) -> CameraTable:
+    """A pinhole camera of the design."""
     width, height = size
     return CameraTable(
         width=width,
@@ -98,12 +115,12 @@ def _camera(size: tuple[int, int], focal_px: float, time_offset_ns: int) -> Came
         cx=(width - 1) / 2,
         cy=(height - 1) / 2,
         rate_hz=CAMERA_RATE_HZ,
-        time_offset_ns=time_offset_ns,
+        time_offset_ns=0,
     )
 
 
-def _with_depth(robot: RobotTable, units_per_m: float) -> GroundTable:
-    return GroundTable(**dict(robot), depth=DepthTable(units_per_m=units_per_m))
+def _with_depth(robot: RobotTable, units_per_m: float, delay_ns: int) -> GroundTable:
+    return GroundTable(**dict(robot), depth=DepthTable(units_per_m=units_per_m, delay_ns=delay_ns))
 
 
 def _imu_table(noise: ImuNoise | None) -> ImuTable:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airground.errors import InputError
+from sim.sensors.optics import PINHOLE, Optics
 from sim.world.magnetic_field import EARTH_FIELD_WORLD
 
 
@@ -100,17 +101,24 @@ class CalibrationErrors:
         camera_to_imu: Angle by which the mounting is off [rad].
         time_offset_ns: Camera's clock against the IMU's [ns].
         depth_scale: Relative error of the depth camera's scale.
+        distortion: Relative error of a lens's coefficients.
     """
 
     focal: float
     camera_to_imu: float
     time_offset_ns: int
     depth_scale: float
+    distortion: float = 0.0
 
 
 @dataclass(frozen=True)
 class SensorPreset:
-    """All sensors of both robots; None is a perfect one."""
+    """All sensors of both robots; None is a perfect one.
+
+    Attributes:
+        mav_optics, ground_optics: Lens and shutter of the MAV's and the ground robot's camera.
+        depth_delay_ns: Time from a colour image to the depth image with its stamp [ns].
+    """
 
     name: str
     image: ImageNoise | None
@@ -118,6 +126,9 @@ class SensorPreset:
     imu: ImuNoise | None
     magnetic: MagneticNoise | None
     calibration: CalibrationErrors | None
+    mav_optics: Optics = PINHOLE
+    ground_optics: Optics = PINHOLE
+    depth_delay_ns: int = 0
 
 
 # ADIS16448 as in EuRoC's sensor.yaml; the biases are those of a few minutes after turn-on.
@@ -152,7 +163,7 @@ NOMINAL = SensorPreset(
     depth=DepthNoise(1.0, 0.8, 1 / 8, 82.0, 2.0, (0.5, 5.0)),
     imu=ADIS16448,
     magnetic=MagneticNoise(0.2e-6, 0.3e-6, 0.6),
-    calibration=CalibrationErrors(1e-3, np.deg2rad(0.1), 1_000_000, 3e-3),
+    calibration=CalibrationErrors(1e-3, np.deg2rad(0.1), 1_000_000, 3e-3, 5e-3),
 )
 
 HARSH = SensorPreset(
@@ -161,7 +172,7 @@ HARSH = SensorPreset(
     depth=DepthNoise(1.5, 1.2, 1 / 8, 77.0, 4.0, (0.5, 4.5)),
     imu=ADIS16448.scaled(3),
     magnetic=MagneticNoise(0.6e-6, 1.1e-6, 1.8),
-    calibration=CalibrationErrors(3e-3, np.deg2rad(0.3), 3_000_000, 9e-3),
+    calibration=CalibrationErrors(3e-3, np.deg2rad(0.3), 3_000_000, 9e-3, 1.5e-2),
 )
 
 PAPER = SensorPreset(
@@ -175,7 +186,7 @@ PAPER = SensorPreset(
     # Focal length: repeated checkerboard calibrations differ by 1 to 2 per mille. Mounting and
     # clock: adjusted by hand, and software stamps over USB. Depth: as it comes, with the mean of
     # the corrections of the TUM RGB-D benchmark's three cameras (3.5, 3.1 and 0 %).
-    calibration=CalibrationErrors(2e-3, np.deg2rad(0.3), 3_000_000, 2.2e-2),
+    calibration=CalibrationErrors(2e-3, np.deg2rad(0.3), 3_000_000, 2.2e-2, 1e-2),
 )
 """Sensors of 2013: consumer parts, calibrated with the tools of the time."""
 

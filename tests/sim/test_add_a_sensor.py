@@ -46,7 +46,7 @@ def test_a_recording_is_made_with_the_preset(
     recording, truth = Recording.open("recordings/home"), Truth.open("recordings/home")
     recording.verify()
     assert recording.sensors == "home"
-    nominal, true = recording.mav.calibration.camera, truth.camera("mav")
+    nominal, true = recording.mav.calibration.camera, truth.lens("mav").pinhole()
     assert abs(nominal.fx / true.fx - 1) == pytest.approx(2e-3)
     assert abs(truth.sensors("mav").camera.time_offset_ns) == 2_000_000
 

@@ -5,11 +5,13 @@ import pytest
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from sim.sensors.camera import MAX_SAMPLES, ExposureDrift, ImageSensor, _motion_terms, _row_motion
+from sim.sensors.camera import MAX_SAMPLES, ExposureDrift, ImageSensor, pixel_motion
 from sim.sensors.hashed_noise import gaussian, noise_key
+from sim.sensors.pixel_rays import PixelRays
 from sim.sensors.presets import HARSH, NOMINAL, ImageNoise
 
 CAMERA = PinholeCamera(80, 60, 70.0, 72.0, 39.0, 30.5)
+RAYS = PixelRays(CAMERA)
 STILL = SE3.identity()
 FAULTLESS = ImageNoise(0.0, 0.0, 0.0, 0.0, 0.01)
 
@@ -18,39 +20,28 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(5)
 
 
-def pixel_motion(depth: np.ndarray, camera: PinholeCamera, T_start_end: SE3) -> np.ndarray:
-    """(height, width, 2) motion of each pixel's scene point in the image [px], row by row."""
-    depth, x_rays, y_rays, focal_px, twist = _motion_terms(depth, camera, T_start_end)
-    motion = np.empty((*depth.shape, 2), np.float32)
-    for row in range(len(depth)):
-        _row_motion(
-            depth[row], x_rays, y_rays[row], focal_px, twist, motion[row, :, 0], motion[row, :, 1]
-        )
-    return motion
-
-
 def test_pixel_motion_is_that_of_projected_points() -> None:
     """A small motion moves each pixel's point as projecting it before and after says."""
     depth = rng().uniform(1.0, 4.0, (60, 80)).astype(np.float32)
     T_start_end = SE3.exp([1e-3, -2e-3, 1.5e-3, 2e-3, 1e-3, -1.5e-3])
     points = CAMERA.back_project(depth.astype(np.float64)).reshape(-1, 3)
     moved = CAMERA.project(T_start_end.inverse() @ points) - CAMERA.project(points)
-    motion = pixel_motion(depth, CAMERA, T_start_end).reshape(-1, 2)
+    motion = pixel_motion(depth, RAYS, T_start_end).reshape(2, -1).T
     assert np.abs(moved).max() > 0.1
     assert np.abs(motion - moved).max() < 0.003
 
 
 def test_nothing_far_away_moves_with_a_turn_only() -> None:
     nowhere = np.full((60, 80), np.nan, np.float32)
-    assert np.abs(pixel_motion(nowhere, CAMERA, SE3.exp([0.1, 0.2, 0.3, 0, 0, 0]))).max() == 0
-    turned = pixel_motion(nowhere, CAMERA, SE3.exp([0, 0, 0, 0, 0.01, 0]))
-    middle = turned[30, 39]
+    assert np.abs(pixel_motion(nowhere, RAYS, SE3.exp([0.1, 0.2, 0.3, 0, 0, 0]))).max() == 0
+    turned = pixel_motion(nowhere, RAYS, SE3.exp([0, 0, 0, 0, 0.01, 0]))
+    middle = turned[:, 30, 39]
     assert middle == pytest.approx([-0.7, 0.0], abs=1e-3)  # looking right moves all to the left
 
 
 def test_a_perfect_camera_changes_nothing() -> None:
     sharp = rng().integers(0, 256, (60, 80, 3), np.uint8)
-    sensor = ImageSensor.of(CAMERA, FAULTLESS, rng())
+    sensor = ImageSensor.of(RAYS, FAULTLESS, rng())
     depth = np.ones((60, 80), np.float32)
     np.testing.assert_array_equal(sensor.expose(sharp, depth, STILL, 1.0, rng()), sharp)
 
@@ -61,7 +52,7 @@ def test_blur_is_the_mean_over_the_exposure() -> None:
     sharp[:, 40:] = 200
     depth = np.full((60, 80), 2.0, np.float32)
     T_start_end = SE3.exp([8 * 2.0 / CAMERA.fx, 0, 0, 0, 0, 0])
-    blurred = ImageSensor.of(CAMERA, FAULTLESS, rng()).expose(sharp, depth, T_start_end, 0.0, rng())
+    blurred = ImageSensor.of(RAYS, FAULTLESS, rng()).expose(sharp, depth, T_start_end, 0.0, rng())
     row = blurred[30, :, 0].astype(float)
     # The edge lies at 39.5; the mean over +-4 px of a step is a line.
     expected = np.clip((np.arange(80) - 39.5 + 4.0) / 8.0, 0, 1) * 200
@@ -74,7 +65,7 @@ def test_noise_at_mid_grey(noise: ImageNoise, deviation: float) -> None:
     only_noise = ImageNoise(noise.read_noise, noise.shot_noise, 0.0, 0.0, 0.0)
     grey = np.full((60, 80, 3), 128, np.uint8)
     depth = np.ones((60, 80), np.float32)
-    image = ImageSensor.of(CAMERA, only_noise, rng()).expose(grey, depth, STILL, 0.0, rng())
+    image = ImageSensor.of(RAYS, only_noise, rng()).expose(grey, depth, STILL, 0.0, rng())
     error = image.astype(float) - 128
     assert error.std() == pytest.approx(deviation, rel=0.05)
     assert abs(error.mean()) < 0.1
@@ -87,7 +78,7 @@ def test_vignetting_darkens_the_corners_by_its_share() -> None:
     noise = ImageNoise(0.0, 0.0, 0.2, 0.0, 0.0)
     white = np.full((60, 80, 1), 200, np.uint8)
     depth = np.ones((60, 80), np.float32)
-    image = ImageSensor.of(CAMERA, noise, rng()).expose(white, depth, STILL, 0.0, rng())
+    image = ImageSensor.of(RAYS, noise, rng()).expose(white, depth, STILL, 0.0, rng())
     assert image[0, 0, 0] == 160
     assert image[30, 40, 0] == 200
 
@@ -105,7 +96,7 @@ def test_exposure_wanders_slowly_and_by_its_deviation() -> None:
 
 def test_the_same_generator_gives_the_same_picture() -> None:
     sharp = rng().integers(0, 256, (60, 80, 3), np.uint8)
-    sensor = ImageSensor.of(CAMERA, NOMINAL.image, rng())
+    sensor = ImageSensor.of(RAYS, NOMINAL.image, rng())
     depth = np.ones((60, 80), np.float32)
     one, two = (sensor.expose(sharp, depth, STILL, 1.0, rng()) for _ in range(2))
     other = sensor.expose(sharp, depth, STILL, 1.0, np.random.default_rng(6))
@@ -163,8 +154,8 @@ def test_exposure_is_that_of_the_obvious_twin(channels: int) -> None:
     depth = rng().uniform(0.3, 4.0, (18, 24)).astype(np.float32)
     depth[5:8, 3:9] = np.nan
     T_start_end = SE3.exp([0.06, -0.02, 0.03, 0.01, 0.02, -0.05])
-    sensor = ImageSensor.of(camera, HARSH.image, rng())
-    motion = pixel_motion(depth, camera, T_start_end)
+    sensor = ImageSensor.of(PixelRays(camera), HARSH.image, rng())
+    motion = np.moveaxis(pixel_motion(depth, PixelRays(camera), T_start_end), 0, -1)
     assert np.abs(motion).max() > 5
     assert np.abs(motion).min() < 0.5
     draw = rng()

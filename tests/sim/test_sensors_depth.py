@@ -14,9 +14,11 @@ from sim.sensors.depth import (
     projector_shadow,
 )
 from sim.sensors.hashed_noise import gaussian, noise_key
+from sim.sensors.pixel_rays import PixelRays
 from sim.sensors.presets import HARSH, NOMINAL, DepthNoise
 
 CAMERA = PinholeCamera(320, 240, 262.5, 262.5, 159.5, 119.5)
+RAYS = PixelRays(CAMERA)
 NOISE = NOMINAL.depth
 
 
@@ -45,14 +47,14 @@ def test_incidence_of_a_plane(tilt: float) -> None:
     rays = CAMERA.rays()
     normal = np.array([0.0, np.sin(np.deg2rad(tilt)), np.cos(np.deg2rad(tilt))])
     expected = np.arccos(rays @ normal / np.linalg.norm(rays, axis=2))
-    angles = incidence_angles(depth, CAMERA)
+    angles = incidence_angles(depth, RAYS)
     # Head-on the angle is a square root of the rounding errors, hence a degree.
     seen = np.isfinite(depth) & (depth < 10)
     assert np.nanmax(np.abs(angles - expected)[seen]) < np.deg2rad(1.0)
 
 
 def test_a_silhouette_is_no_surface() -> None:
-    angles = np.rad2deg(incidence_angles(step(), CAMERA))
+    angles = np.rad2deg(incidence_angles(step(), RAYS))
     assert angles.max() < 60  # of the rays alone; the jump in depth adds nothing
 
 
@@ -90,7 +92,7 @@ def test_incidence_is_that_of_the_obvious_twin() -> None:
     depth = uneven(camera)
     inverse = 1 / depth.astype(np.float64)
     twin = [angle_of_pixel(inverse, camera, *pixel) for pixel in np.ndindex(depth.shape)]
-    angles = incidence_angles(depth, camera).ravel()
+    angles = incidence_angles(depth, PixelRays(camera)).ravel()
     np.testing.assert_array_equal(np.isnan(angles), np.isnan(twin))
     # Head-on the angle is a square root of the rounding errors.
     np.testing.assert_allclose(angles, twin, atol=2e-3)
@@ -104,7 +106,7 @@ def measured_pixel_by_pixel(
     axial = correlated_noise(height, width, draw)
     key = noise_key(draw)
     patches = patch_noise(height, width, draw)
-    incidence = incidence_angles(depth, camera).astype(float)
+    incidence = incidence_angles(depth, PixelRays(camera)).astype(float)
     shadow = projector_shadow(depth, camera.fx * BASELINE_M)
     measured = np.full(depth.shape, np.nan)
     for row, column in np.ndindex(height, width):
@@ -138,7 +140,7 @@ def test_measured_depth_is_that_of_the_obvious_twin() -> None:
     """Up to rounding: float32 may fall on the other side of a disparity's step."""
     camera = PinholeCamera(64, 48, 50.0, 51.0, 31.0, 23.5)
     depth = uneven(camera)
-    measured = kinect_depth(depth, camera, NOISE, rng(2))
+    measured = kinect_depth(depth, PixelRays(camera), NOISE, rng(2))
     twin = measured_pixel_by_pixel(depth, camera, NOISE, rng(2))
     assert 0.1 < np.isnan(twin).mean() < 0.9
     assert (np.isnan(measured) != np.isnan(twin)).mean() < 0.002
@@ -149,7 +151,7 @@ def test_measured_depth_is_that_of_the_obvious_twin() -> None:
 @pytest.mark.parametrize("distance", [0.8, 1.5, 2.5, 4.0])
 def test_axial_noise_head_on(distance: float) -> None:
     depth = plane(distance)
-    error = kinect_depth(depth, CAMERA, NOISE, rng()) - depth
+    error = kinect_depth(depth, RAYS, NOISE, rng()) - depth
     middle = error[100:140, 120:200]
     published = 0.0012 + 0.0019 * (distance - 0.4) ** 2
     quantum = distance**2 / (INFRARED_FOCAL_PX * BASELINE_M) * NOISE.disparity_step_px
@@ -160,7 +162,7 @@ def test_axial_noise_head_on(distance: float) -> None:
 
 
 def test_disparity_comes_in_steps() -> None:
-    measured = kinect_depth(plane(2.5, 20.0), CAMERA, NOISE, rng())
+    measured = kinect_depth(plane(2.5, 20.0), RAYS, NOISE, rng())
     steps = INFRARED_FOCAL_PX * BASELINE_M / measured[np.isfinite(measured)] / (1 / 8)
     assert np.abs(steps - np.round(steps)).max() < 1e-3
     assert len(np.unique(np.round(steps))) > 5
@@ -168,7 +170,7 @@ def test_disparity_comes_in_steps() -> None:
 
 def test_range_ends() -> None:
     for distance in (0.3, 5.6):
-        assert np.isnan(kinect_depth(plane(distance), CAMERA, NOISE, rng())).mean() > 0.99
+        assert np.isnan(kinect_depth(plane(distance), RAYS, NOISE, rng())).mean() > 0.99
 
 
 def shadow_by_rays(depth: np.ndarray, focal_times_baseline: float) -> np.ndarray:
@@ -207,7 +209,7 @@ def test_shadow_falls_to_the_left_and_is_as_wide_as_the_disparities_differ() -> 
 
 def test_silhouettes_are_ragged_and_partly_missing() -> None:
     depth = step()
-    measured = kinect_depth(depth, CAMERA, NOISE, rng())
+    measured = kinect_depth(depth, RAYS, NOISE, rng())
     right_edge = measured[70:170, 197:203]
     assert 0.02 < np.isnan(right_edge).mean() < 0.5
     swapped = np.abs(right_edge - depth[70:170, 197:203]) > 0.5
@@ -220,7 +222,7 @@ def test_silhouettes_are_ragged_and_partly_missing() -> None:
 def test_grazing_surfaces_vanish_softly() -> None:
     def missing(noise, tilt: float) -> float:
         depth = plane(1.5, tilt)
-        return float(np.isnan(kinect_depth(depth, CAMERA, noise, rng()))[118:122].mean())
+        return float(np.isnan(kinect_depth(depth, RAYS, noise, rng()))[118:122].mean())
 
     assert missing(NOISE, 60.0) < 0.01
     assert 0.2 < missing(NOISE, 82.0) < 0.8
@@ -229,6 +231,6 @@ def test_grazing_surfaces_vanish_softly() -> None:
 
 
 def test_the_same_generator_gives_the_same_depth() -> None:
-    one, two, other = (kinect_depth(step(), CAMERA, NOISE, rng(seed)) for seed in (1, 1, 2))
+    one, two, other = (kinect_depth(step(), RAYS, NOISE, rng(seed)) for seed in (1, 1, 2))
     np.testing.assert_array_equal(one, two)
     assert np.nanmean(one != other) > 0.5

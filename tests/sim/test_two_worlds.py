@@ -71,7 +71,7 @@ def test_truth_is_that_of_the_world_that_a_robot_sees(
 ) -> None:
     """Depth by rays against the stored surface is what the renderer draws."""
     truth, world = Truth.open(recorded), worlds[robot]
-    camera = truth.camera(robot)
+    camera = truth.lens(robot).pinhole()
     with Renderer(with_cameras(world.spec, {robot: camera})) as renderer:
         for stamp in stamps(recorded, robot):
             _, drawn = renderer.draw(robot, truth.T_world_camera(robot, stamp))
@@ -83,7 +83,7 @@ def test_truth_is_that_of_the_world_that_a_robot_sees(
 
 def test_the_mavs_images_show_the_changed_world(recorded: Path, worlds: dict[Robot, World]) -> None:
     truth, recording, world = Truth.open(recorded), Recording.open(recorded), worlds["mav"]
-    camera, stamp = truth.camera("mav"), stamps(recorded, "mav")[-1]
+    camera, stamp = truth.lens("mav").pinhole(), stamps(recorded, "mav")[-1]
     pose = truth.T_world_camera("mav", stamp)
     edges = find_edges((world.vertices, world.triangles))
     with Renderer(with_cameras(world.spec, {"mav": camera})) as renderer:

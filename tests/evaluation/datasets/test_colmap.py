@@ -64,7 +64,10 @@ def test_rays_through_the_pixels_meet_the_points(model, simulated: Simulated) ->
         robot, name = image.name.split("/")
         files = [file.name for file in simulated.image_files(robot)]
         stamp = simulated.stamps_ns(robot)[files.index(name)]
-        T, camera = simulated.truth.T_world_camera(robot, stamp), simulated.truth.camera(robot)
+        T, camera = (
+            simulated.truth.T_world_camera(robot, stamp),
+            simulated.truth.lens(robot).pinhole(),
+        )
         observed = image.get_observation_points2D()
         x, y = (np.array([p.xy for p in observed]) - PIXEL_CENTRE).T
         ahead = np.stack(

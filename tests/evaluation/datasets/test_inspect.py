@@ -237,7 +237,7 @@ def test_the_error_is_measured_in_pixels(
     """A second pose that is wrong by so many pixels is found to be off by as many."""
     truth, recording = simulated.truth, simulated.recording
     stamps = simulated.stamps_ns(robot)  # type: ignore[arg-type]
-    camera = truth.camera(robot)  # type: ignore[arg-type]
+    camera = truth.lens(robot).pinhole()  # type: ignore[arg-type]
     posed = []
     for index in (2, 2 + APART):
         if robot == "mav":

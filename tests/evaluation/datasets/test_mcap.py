@@ -94,7 +94,7 @@ def test_samples_and_calibration_are_as_recorded(bag: Bag, simulated: Simulated)
             np.testing.assert_array_equal([turn.x, turn.y, turn.z], imu.gyro[index])
         field = bag[f"/{robot}/magnetic_field"][7][1].magnetic_field
         np.testing.assert_array_equal([field.x, field.y, field.z], magnetic.field[7])
-        camera = simulated.nominal(robot).camera.pinhole()
+        camera = simulated.nominal(robot).camera.lens().pinhole()
         info = bag[f"/{robot}/camera/camera_info"][0][1]
         np.testing.assert_array_equal(info.k.reshape(3, 3), camera.matrix())
         assert (info.width, info.height) == (camera.width, camera.height)

@@ -22,6 +22,7 @@ from evaluation.datasets.pixel_truth_files import (
 from evaluation.datasets.simulated import Simulated
 from sim.geometry.parts import KINDS, Instances, Part, read_parts, write_parts
 from sim.recording.pixel_truth import PixelTruth, flow, instance_ids, instances_of, pixel_truth
+from sim.recording.row_poses import RowPoses
 from sim.recording.truth import Truth
 from sim.robots.motion import ROBOTS, Robot
 
@@ -44,7 +45,7 @@ def test_depth_is_that_of_the_evaluator(simulated: Simulated, robot: Robot) -> N
 def test_normals_are_those_of_the_depth(simulated: Simulated, robot: Robot) -> None:
     seen = seen_by(simulated, robot)
     assert np.nanmax(np.abs(np.linalg.norm(seen.normals, axis=-1) - 1)) < 1e-5
-    points = seen.camera.back_project(seen.depth.astype(np.float64))
+    points = seen.lens.rays() * seen.depth.astype(np.float64)[..., None]
     assert np.nanmax(np.einsum("ijk,ijk->ij", points, seen.normals)) < 0
     # Both neighbours of a pixel on the same triangle lie in its plane.
     same = seen.triangle[1:-1, 1:-1] >= 0
@@ -64,7 +65,7 @@ def test_normals_face_a_camera_behind_a_surface_too(
     simulated: Simulated, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     below = SE3(np.eye(3), np.array([0.0, 0.0, -1.0]))  # looks up at the floor's back
-    monkeypatch.setattr(Truth, "T_world_camera", lambda *_: below)
+    monkeypatch.setattr(Truth, "row_poses", lambda *_: RowPoses.same(below, 480))
     seen = seen_by(simulated, "mav")
     floor = seen.normals[np.isfinite(seen.depth)]
     assert len(floor) > 100_000
@@ -100,7 +101,8 @@ def test_flow_carries_depth_to_the_next_image(simulated: Simulated, robot: Robot
     rows, columns = np.nonzero(moved.visible)
     assert len(rows) > 10_000
     to = moved.flow_px[rows, columns] + np.stack([columns, rows], axis=1)
-    places = other.T_world_camera.inverse() @ seen.points_world()[rows, columns]
+    pose = simulated.truth.T_world_camera(robot, stamp)
+    places = pose.inverse() @ seen.points_world()[rows, columns]
     # Interpolate along rays, where 1 / depth of a plane is linear in the image.
     inverse = map_coordinates(1 / other.depth, to[:, ::-1].T, order=1, cval=np.nan)
     error = np.abs(inverse * places[:, 2] - 1)

@@ -1,0 +1,75 @@
+"""What one robot's camera sees through its lens and shutter, before the sensor's faults."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from airground.core.se3 import SE3
+from airground.io.lens import Lens
+from sim.geometry.edges import Edges
+from sim.recording.render import Renderer
+from sim.recording.resample import places_in_view, resampled
+from sim.recording.row_poses import strip_poses
+from sim.recording.smooth_edges import smooth_edges
+from sim.recording.view_tiles import Tile, is_plain, tiles_of
+from sim.robots.motion import Motion, Robot
+
+Drawn = tuple[NDArray[np.uint8], NDArray[np.float32]]
+"""(height, width, channels) picture, and (height, width) depth [m]."""
+
+
+class RobotView:
+    """Draws one robot's images from the stored motion.
+
+    Args:
+        lens: True lens and shutter.
+        renderer: World with the cameras of `tiles_of` this lens.
+        edges: Edges of all visible meshes.
+        grey: Whether pictures have one channel in place of three.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        lens: Lens,
+        motion: Motion,
+        renderer: Renderer,
+        edges: Edges,
+        grey: bool,
+    ) -> None:
+        self._robot, self._lens, self._motion = robot, lens, motion
+        self._renderer, self._edges, self._grey = renderer, edges, grey
+        self._tiles = tiles_of(robot, lens)
+        self._rays = None if is_plain(lens) else lens.rays()
+
+    def draw(self, time_ns: int) -> Drawn:
+        """The image whose middle row is taken at a time of the motion [ns].
+        Depth is along the optical axis of each row's own pose, NaN where there is nothing."""
+        if self._rays is None:
+            return self._view(self._tiles[0], self._motion.camera_pose(self._robot, time_ns))
+        channels = 1 if self._grey else 3
+        picture = np.empty((self._lens.height, self._lens.width, channels), np.uint8)
+        depth = np.empty(picture.shape[:2], np.float32)
+        for tile in self._tiles:
+            place = tile.rows, tile.columns
+            picture[place], depth[place] = self._tile(tile, self._rays[place], time_ns)
+        return picture, depth
+
+    def _tile(self, tile: Tile, rays: NDArray[np.float64], time_ns: int) -> Drawn:
+        T_world_strip, poses = strip_poses(
+            self._motion, self._robot, self._lens, time_ns, tile.rows
+        )
+        poses = poses.seen_from(tile.T_camera_view)
+        picture, depth = self._view(tile, T_world_strip @ tile.T_camera_view)
+        places, found = places_in_view(rays, poses, depth, tile.camera)
+        return resampled(picture, places), found
+
+    def _view(self, tile: Tile, T_world_view: SE3) -> Drawn:
+        """One pinhole view, with smooth edges."""
+        picture, depth = self._renderer.draw(tile.name, T_world_view)
+        if self._grey:
+            picture = np.asarray(cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY), np.uint8)[..., None]
+        smooth = smooth_edges(picture, depth, tile.camera, T_world_view, self._edges)
+        return smooth, depth
