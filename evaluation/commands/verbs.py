@@ -40,6 +40,10 @@ JOBS: dict[str, dict[str, tuple[str, str]]] = {
             "Hold results against accepted ones: better, worse, or no difference seen.",
         ),
         "accept": ("results", "Accept results: later changes are held against them."),
+        "history": (
+            "history",
+            "Draw accuracy over revisions: figures, intervals and steps, as a page and as JSON.",
+        ),
     },
     "this machine": {
         "bench": ("machine", "Time the pipeline's stages on this machine (Table I)."),

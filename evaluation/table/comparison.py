@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from evaluation.table.intervals import Interval
+
 PERMUTATIONS = 10_000
 """Tests are exact up to this number of rearrangements; beyond it they draw as many."""
 RESAMPLES = 2_000
@@ -100,6 +102,19 @@ def two_sample_effect(
     return _effect(value, draws, min(len(before), len(after)), tested.pvalue)
 
 
+def centre_interval(values: NDArray[np.float64], share: bool) -> Interval:
+    """Median of N observations, for shares their mean, with its 95 % bootstrap interval; no
+    interval for fewer than `LEAST_OBSERVATIONS`, all NaN for none."""
+    if len(values) == 0:
+        return Interval(np.nan, np.nan, np.nan)
+    centre = _means if share else _medians
+    value = float(centre(np.asarray(values, np.float64)[None])[0])
+    if len(values) < LEAST_OBSERVATIONS:
+        return Interval(value, np.nan, np.nan)
+    draws = centre(_resampled(values, np.random.default_rng(SEED)))
+    return Interval(value, *_expanded(draws, len(values)))
+
+
 def subtract(after: NDArray[np.float64], before: NDArray[np.float64]) -> NDArray[np.float64]:
     """After minus before, where failing on both sides is no difference."""
     with np.errstate(invalid="ignore"):
@@ -163,12 +178,17 @@ def _medians(samples: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _effect(value: float, draws: NDArray[np.float64], n: int, p: float) -> Effect:
-    """With the expanded percentile interval, which few observations need.
+    return Effect(value, *_expanded(draws, n), float(p))
+
+
+def _expanded(draws: NDArray[np.float64], n: int) -> tuple[float, float]:
+    """The ends of the expanded percentile interval, which few observations need.
     Resampling N observations spreads sqrt((N - 1) / N) too little, and neglects that the spread is
     itself estimated (Hesterberg, The American Statistician 69(4), 2015)."""
     reach = stats.t.ppf(0.975, n - 1) * np.sqrt(n / (n - 1))
     tail = float(stats.norm.cdf(-reach))
     ordered = np.sort(draws)
     last = len(ordered) - 1
-    low, high = ordered[int(np.floor(tail * last))], ordered[int(np.ceil((1 - tail) * last))]
-    return Effect(value, float(low), float(high), float(p))
+    return float(ordered[int(np.floor(tail * last))]), float(
+        ordered[int(np.ceil((1 - tail) * last))]
+    )

@@ -1,0 +1,1 @@
+"""Accuracy over revisions: points, and steps between them."""

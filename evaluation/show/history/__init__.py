@@ -1,0 +1,1 @@
+"""Accuracy over revisions, as a page and for dashboards."""
