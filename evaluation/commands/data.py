@@ -184,7 +184,7 @@ class Export(OutOption, Verb):
 
     recording: Annotated[Positional[Path], Shown("RECORDING")]
     """folder that simulate has written"""
-    format: Literal["tum", "euroc", "mcap", "nerfstudio", "colmap"]
+    format: Literal["tum", "euroc", "mcap", "nerfstudio", "colmap", "webdataset"]
     """tum is of the ground robot, euroc of the MAV, the others of either"""
     robot: Annotated[
         Literal["mav", "ground", "both"] | None, Shown("{mav,ground,both}", "what the format holds")

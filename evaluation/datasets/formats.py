@@ -14,6 +14,7 @@ from evaluation.datasets.mcap import write_bag
 from evaluation.datasets.nerfstudio import write_nerfstudio_folder
 from evaluation.datasets.simulated import Simulated
 from evaluation.datasets.tum import write_tum_folder
+from evaluation.datasets.webdataset import write_webdataset
 from sim.robots.motion import ROBOTS, Robot
 
 Robots = tuple[Robot, ...]
@@ -43,6 +44,7 @@ FORMATS = {
         "one transforms.json is of one camera: give --robot mav or --robot ground",
     ),
     "colmap": Format(write_colmap_folder, ROBOTS, (ROBOTS, MAV, GROUND)),
+    "webdataset": Format(write_webdataset, ROBOTS, (ROBOTS, MAV, GROUND)),
 }
 
 
