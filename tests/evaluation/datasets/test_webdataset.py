@@ -96,9 +96,8 @@ def test_the_same_recording_gives_the_same_bytes(
 def test_croissant_reads_every_file(
     folder: Path, simulated: Simulated, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(
-        extract, "EXTRACT_PATH", extract.epath.Path(tmp_path)
-    )  # not in the user's cache
+    # Not in the user's cache.
+    monkeypatch.setattr(extract, "EXTRACT_PATH", extract.epath.Path(tmp_path))
     dataset = mlcroissant.Dataset(jsonld=folder / "croissant.json")
     assert not dataset.metadata.ctx.issues.errors
     for index, record in enumerate(dataset.records("mav_grey")):
