@@ -124,8 +124,9 @@ class SensorOption:
 
     heading: ClassVar[str] = "input"
 
-    sensors: Literal["none", "nominal", "harsh", "paper"] = "nominal"
-    """noise and calibration errors; paper: sensors of 2013"""
+    sensors: Literal["none", "nominal", "harsh", "paper", "real"] = "nominal"
+    """noise and calibration errors; paper: sensors of 2013; real: nominal ones with distortion and
+    rolling shutters"""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -103,7 +103,7 @@ class Reproduce(
     suite: Annotated[Literal["fast"] | None, _SMALLER, Shown("fast")] = None
     """the fixed small suite for check, with the setup asked for only"""
     sensors: Annotated[
-        Literal["none", "nominal", "harsh", "paper"] | None,
+        Literal["none", "nominal", "harsh", "paper", "real"] | None,
         Shown("NAME", "nominal, or paper with --preset paper"),
     ] = None
     """noise of the sensors"""

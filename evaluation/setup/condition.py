@@ -17,7 +17,7 @@ class Condition:
     Attributes:
         preset: "best", "paper" or "paper_literal".
         poses: "slam", "oracle exact", "oracle with drift", or "slam, exact mav" (or ground).
-        sensors: "none", "nominal", "harsh" or "paper".
+        sensors: "none", "nominal", "harsh", "paper" or "real".
         heading: "known" or "search".
         variant: Other differences from the preset, as text; empty without any.
     """

@@ -1,4 +1,5 @@
-"""How good the robots' sensors are: perfect, as in life, three times worse, or as in 2013."""
+"""How good the robots' sensors are: perfect, as in life, three times worse, as in 2013, or with
+the lenses and shutters of consumer cameras."""
 
 from __future__ import annotations
 
@@ -7,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from airground.errors import InputError
+from airground.io.lens import KINECT_READOUT_S
 from sim.sensors.optics import PINHOLE, Optics
 from sim.world.magnetic_field import EARTH_FIELD_WORLD
 
@@ -190,7 +192,18 @@ PAPER = SensorPreset(
 )
 """Sensors of 2013: consumer parts, calibrated with the tools of the time."""
 
-PRESETS = {preset.name: preset for preset in (NONE, NOMINAL, HARSH, PAPER)}
+REAL = replace(
+    NOMINAL,
+    name="real",
+    # 480 rows, one each 30 us.
+    mav_optics=Optics("radtan", readout_s=0.0144),
+    ground_optics=Optics("radtan", readout_s=KINECT_READOUT_S),
+    # The two cameras of a Kinect have no common trigger: half of a period of 30 Hz at most.
+    depth_delay_ns=10_000_000,
+)
+"""The noise of `nominal`, with lenses and rolling shutters as consumer cameras have them."""
+
+PRESETS = {preset.name: preset for preset in (NONE, NOMINAL, HARSH, PAPER, REAL)}
 
 
 def sensor_preset(name: str) -> SensorPreset:
@@ -220,6 +233,24 @@ def with_noise(preset: SensorPreset, factor: float) -> SensorPreset:
             depth, axial_scale=factor * depth.axial_scale, lateral_px=factor * depth.lateral_px
         ),
         imu=imu and imu.scaled(factor),
+    )
+
+
+def with_readout(preset: SensorPreset, readout_s: float) -> SensorPreset:
+    """The preset with rolling shutters of this readout time [s]; 0 for global ones."""
+    return replace(
+        preset,
+        mav_optics=replace(preset.mav_optics, readout_s=readout_s),
+        ground_optics=replace(preset.ground_optics, readout_s=readout_s),
+    )
+
+
+def with_distortion(preset: SensorPreset, factor: float) -> SensorPreset:
+    """The preset with radial-tangential lenses of `factor` times the measured distortion."""
+    return replace(
+        preset,
+        mav_optics=replace(preset.mav_optics, lens="radtan", distortion=factor),
+        ground_optics=replace(preset.ground_optics, lens="radtan", distortion=factor),
     )
 
 

@@ -12,7 +12,13 @@ from airground.errors import InputError
 from evaluation.setup.settings import with_value
 from sim.appearance.other_light import later_light, light_between
 from sim.scene import MAX_HEAP_HEIGHT_M, Light, Scene
-from sim.sensors.presets import SensorPreset, with_heading_error, with_noise
+from sim.sensors.presets import (
+    SensorPreset,
+    with_distortion,
+    with_heading_error,
+    with_noise,
+    with_readout,
+)
 
 Value = float | int | str | bool | list[Any]
 Point = Mapping[str, Value]
@@ -124,6 +130,16 @@ DIALS = (
         "sensors.noise", "", 0.0, 10.0,
         "factor of the noise of images, depth and inertial sensors",
         lambda subject, value: replace(subject, sensors=with_noise(subject.sensors, value)),
+    ),
+    Dial(
+        "sensors.readout_ms", "ms", 0.0, 30.0,
+        "time from the first to the last row of both cameras' images; 0 is a global shutter",
+        lambda subject, value: replace(subject, sensors=with_readout(subject.sensors, value / 1e3)),
+    ),
+    Dial(
+        "sensors.distortion", "", 0.0, 1.5,
+        "factor of the measured radial-tangential distortion of both cameras' lenses",
+        lambda subject, value: replace(subject, sensors=with_distortion(subject.sensors, value)),
     ),
     Dial(
         "sensors.heading_error_deg", "deg", 0.0, 45.0,
