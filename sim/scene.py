@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -13,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from airground.errors import InputError
-from airground.io.input_files import SETTINGS_LIMIT, read_text
+from airground.io.input_files import SETTINGS_LIMIT, parse_toml, read_text
 
 Positive = Annotated[float, Field(gt=0)]
 NonNegative = Annotated[float, Field(ge=0)]
@@ -252,11 +251,11 @@ def parse_scene(text: str, file: str) -> Scene:
         InputError: One line that names the file, the key and what would be right.
     """
     try:
-        return Scene.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{file}: not valid TOML: {error}") from None
+        return Scene.model_validate(parse_toml(text))
     except ValidationError as error:
         raise InputError(f"{file}: {_first_problem(error)}") from None
+    except ValueError as error:
+        raise InputError(f"{file}: not valid TOML: {error}") from None
 
 
 def _first_problem(error: ValidationError) -> str:

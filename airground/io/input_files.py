@@ -58,7 +58,11 @@ def read_toml_text(path: Path) -> dict[str, Any]:
         OSError: As `read_bytes`.
         ValueError: It is no TOML.
     """
-    text = read_text(path, SETTINGS_LIMIT)
+    return parse_toml(read_text(path, SETTINGS_LIMIT))
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """A text's tables; raises ValueError where it is no TOML or nested too deep."""
     if _DEEP_KEY.search(text):  # tomllib takes minutes over ten thousands of levels
         raise ValueError("a key has more than 64 levels")
     try:

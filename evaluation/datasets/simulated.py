@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from airground.core.messages import ImuSamples, MagneticSamples
 from airground.core.se3 import SE3
-from airground.errors import InputError
+from airground.errors import InputError, RecordingError
 from airground.io.calibration import RobotTable
 from airground.io.image_files import ImageFiles
 from airground.io.layout import HEADER
@@ -44,7 +46,14 @@ class Simulated:
         recording = Recording.open(path)
         recording.verify()
         assert isinstance(recording.images, ImageFiles)
-        return cls(recording, Truth.open(path), recording.images)
+        truth = Truth.open(path)
+        for robot in (recording.mav, recording.ground):
+            assert robot.imu is not None
+            if not np.array_equal(robot.imu.stamps_ns, truth.motion.stamps_ns):
+                raise RecordingError(
+                    f"{truth.folder}: its motion has other stamps than the {robot.robot.name} IMU"
+                )
+        return cls(recording, truth, recording.images)
 
     def sensed(self, robot: Robot) -> RobotRecording[Any]:
         return self.recording.mav if robot == "mav" else self.recording.ground

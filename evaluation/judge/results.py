@@ -60,11 +60,17 @@ def _check_folder(folder: Path) -> None:
 
 
 def merged(parts: Sequence[Results]) -> Results:
-    """Several results as one; the first gives the primary condition and the pictures."""
+    """Several results as one; the first gives the primary condition and the pictures.
+
+    Raises:
+        InputError: Two of them measured the same flight under the same condition.
+    """
     first = parts[0]
+    table = ResultTable.concat([part.table for part in parts])
+    table.check_once("these runs together")
     showcases = [part.showcase for part in parts if part.showcase is not None]
     return Results(
-        table=ResultTable.concat([part.table for part in parts]),
+        table=table,
         config=first.config,
         seed=first.seed,
         showcase=showcases[0] if showcases else None,

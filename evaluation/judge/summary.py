@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
-from typing import Literal, Self
+from typing import Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
@@ -160,6 +160,8 @@ def build_summary(table: ResultTable, condition: Condition, run: RunInfo) -> Sum
     measured = of_condition.scored()
     if len(measured) == 0:
         raise InputError(f"results: nothing was measured with {condition.label()}")
+    if condition.preset not in get_args(PresetName):
+        raise InputError(f"results: unknown preset {condition.preset!r}")
     return Summary(
         schema=SCHEMA,
         version=run.version,

@@ -20,6 +20,7 @@ from airground.core.se3 import SE3
 from airground.core.surface import AerialSurface, DepthMap
 from airground.core.trajectory import Trajectory
 from airground.errors import InputError
+from airground.io.array_files import UNREADABLE_ARRAYS, read_arrays
 from airground.io.ply import read_ply, write_ply
 from evaluation.measure.baselines.matched_images import MatchedImages
 
@@ -119,8 +120,7 @@ class Showcase:
         another kind."""
         path = folder / ARRAYS
         try:
-            with np.load(path, allow_pickle=False) as stored:
-                entries = {name: stored[name] for name in stored.files}
+            entries = read_arrays(path)
             members: dict[str, Any] = {
                 name: _built(name, hint, entries)
                 for name, hint in get_type_hints(cls).items()
@@ -128,7 +128,7 @@ class Showcase:
             }
         except KeyError as error:
             raise InputError(f"{path}: entry {error} is missing") from error
-        except (OSError, ValueError) as error:
+        except (*UNREADABLE_ARRAYS, TypeError) as error:
             raise InputError(f"{path}: no readable showcase ({error})") from error
         clouds = {name: read_ply(folder / file)[0] for name, file in CLOUDS.items()}
         return cls(**members | clouds)

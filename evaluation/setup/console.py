@@ -34,6 +34,8 @@ EXIT_ERROR = 2
 EXIT_FAULT_FOUND = 3
 EXIT_INTERNAL = 70
 """EX_SOFTWARE of the BSD header sysexits.h."""
+LONGEST_MESSAGE = 800
+"""Characters of a message: some lines of a screen."""
 EXIT_INTERRUPTED = 130
 """128 + SIGINT, as shells give it."""
 
@@ -98,8 +100,13 @@ def run(command: Callable[[], int | None], verbose: bool = False) -> int:
 
 
 def print_error(message: str) -> None:
+    """One readable line: a message may quote control characters of a file, or megabytes."""
     one_line = " ".join(message.split())
-    print(f"airground: error: {one_line}", file=sys.stderr)
+    if len(one_line) > LONGEST_MESSAGE:
+        half = LONGEST_MESSAGE // 2
+        one_line = f"{one_line[:half]} [...] {one_line[-half:]}"
+    shown = "".join(letter if letter.isprintable() else "\ufffd" for letter in one_line)
+    print(f"airground: error: {shown}", file=sys.stderr)
 
 
 def describe(error: OSError) -> str:

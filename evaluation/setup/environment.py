@@ -59,6 +59,8 @@ def prepare(threads: int | None = None) -> int:
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
     # OpenMP first: with an outdated TBB, which numba would prefer, each run prints a warning.
     os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp tbb workqueue")
+    # A damaged image is reported by whoever reads it, in one line.
+    os.environ.setdefault("OPENCV_LOG_LEVEL", "OFF")
     _choose_renderer()
     _keep_freed_memory()
     return count

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
@@ -12,7 +11,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from airground.config import PRESETS, Config, Section
 from airground.errors import ConfigError
-from airground.io.input_files import read_toml_text
+from airground.io.input_files import parse_toml, read_toml_text
 from evaluation.setup.setups import PoseNoise, Reference
 
 DEFAULT_PRESET = "best"
@@ -182,8 +181,8 @@ def _split(override: str) -> tuple[str, str, Any]:
 def parsed_value(text: str) -> Any:
     """A value as in TOML, or a word that needs no quotes here."""
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        return parse_toml(f"value = {text}")["value"]
+    except ValueError:
         return text.strip()
 
 

@@ -52,6 +52,9 @@ _DTYPES = {
     "time_s": "float64",
 }
 
+_MEASURED = ("value", "unit", "note", "time_s")
+"""Columns that do not tell measurements apart."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -115,7 +118,25 @@ class ResultTable:
             frame = pd.read_parquet(path)
         except (OSError, ValueError) as error:
             raise InputError(f"{path}: no readable results table ({error})") from error
-        return cls(frame)
+        try:
+            table = cls(frame)
+        except (TypeError, ValueError, OverflowError) as error:
+            raise InputError(f"{path}: a column has values of a wrong type ({error})") from None
+        table.check_once(str(path))
+        return table
+
+    def check_once(self, origin: str) -> None:
+        """Raise InputError, naming `origin`, if a numbered measurement is there twice."""
+        frame = self.frame
+        numbered = frame[frame[["sequence", "iteration", "trial"]].notna().any(axis=1)]
+        once = numbered[numbered["time_s"].isna()]
+        again = once[once.duplicated([name for name in _DTYPES if name not in _MEASURED])]
+        if len(again):
+            row = again.iloc[0]
+            raise InputError(
+                f"{origin}: {row['stage']} {row['metric']} of scene {row['scene']}, seed "
+                f"{row['seed']}, flight {row['flight']} is there twice; expected once"
+            )
 
     def write(self, path: Path) -> None:
         self.frame.to_parquet(path, index=False)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.errors import RecordingError
+from airground.io.input_files import check_file
 from sim.geometry.parts import Part, read_parts, write_parts
 from sim.world.world import World
 
@@ -33,8 +34,13 @@ class TrueSurface:
     def mesh(self) -> o3d.geometry.TriangleMesh:
         """The mesh; RecordingError if it is missing or damaged."""
         path = self.path
-        mesh = o3d.io.read_triangle_mesh(path) if path.is_file() else None
-        if mesh is None or not mesh.has_triangles():
+        try:
+            check_file(path)
+        except OSError as error:
+            raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None
+        with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+            mesh = o3d.io.read_triangle_mesh(path)
+        if not mesh.has_triangles():
             raise RecordingError(f"{path}: no readable mesh with triangles")
         vertices, triangles = np.asarray(mesh.vertices), np.asarray(mesh.triangles)
         if not np.isfinite(vertices).all():

@@ -66,7 +66,10 @@ class Truth:
     def T_world_camera(self, robot: Robot, stamp_ns: int) -> SE3:
         """Pose of a camera at a stamp of its own clock, which runs a little off."""
         offset_ns = self.sensors(robot).camera.time_offset_ns
-        return self.motion.camera_pose(robot, stamp_ns + offset_ns)
+        try:
+            return self.motion.camera_pose(robot, stamp_ns + offset_ns)
+        except ValueError as error:
+            raise RecordingError(f"{self.folder}: no true pose of the {robot}: {error}") from None
 
     def sensors(self, robot: Robot) -> RobotTable:
         return self.calibration.mav if robot == "mav" else self.calibration.ground

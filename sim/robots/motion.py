@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from airground.core.arrays import read_only
 from airground.core.se3 import SE3
 from airground.errors import InputError
-from airground.io.input_files import TEXT_LIMIT, check_file
+from airground.io.array_files import UNREADABLE_ARRAYS, read_arrays
 from sim.robots.flight import fly, plan_flight
 from sim.robots.ground_robot import drive, floor_under, mounting, plan_drive
 from sim.robots.overlap import driven_path
@@ -97,27 +96,15 @@ class Motion:
             InputError: The file is missing, damaged, or of another format.
         """
         try:
-            _check_arrays(path)
-            with np.load(path, allow_pickle=False) as file:
-                arrays = {key: file[key] for key in file.files}
+            arrays = read_arrays(path)
             if arrays["format"] != _FORMAT:
                 raise ValueError(f"its format is {arrays['format']}, expected {_FORMAT}")
             robots = {name: _robot_from(arrays, name) for name in ROBOTS}
             return cls(stamps_ns=arrays["stamps_ns"], **robots)
-        except (OSError, EOFError, ValueError, zipfile.BadZipFile) as error:
+        except (*UNREADABLE_ARRAYS, TypeError) as error:
             raise InputError(f"{path}: not a readable motion: {error}") from None
         except KeyError as error:
             raise InputError(f"{path}: not a whole motion: array {error} is missing") from None
-
-
-def _check_arrays(path: Path) -> None:
-    """OSError or ValueError unless it is a file whose arrays fit in memory: a small one can hold
-    huge ones."""
-    check_file(path)
-    with zipfile.ZipFile(path) as archive:
-        size = sum(member.file_size for member in archive.infolist())
-    if size > TEXT_LIMIT:
-        raise ValueError(f"its arrays have {size} bytes, expected at most {TEXT_LIMIT}")
 
 
 def _robot_from(arrays: dict[str, NDArray], name: str) -> RobotMotion:

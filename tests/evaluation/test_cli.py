@@ -186,6 +186,19 @@ class TestRun:
         assert console.run(fail) == console.EXIT_ERROR
         assert one_error_line(capsys).endswith("line 7: stamp 5 repeats")
 
+    def test_a_message_is_short_and_printable(self, capsys: pytest.CaptureFixture[str]) -> None:
+        """Whatever it quotes of a file."""
+
+        def fail() -> None:
+            raise InputError("a.toml: \x1b[2J" + "x" * 100_000 + " is no number")
+
+        assert console.run(fail) == console.EXIT_ERROR
+        line = one_error_line(capsys)
+        assert line.isprintable()
+        assert len(line) < 1000
+        assert line.startswith("airground: error: a.toml: ")
+        assert line.endswith("is no number")
+
     def test_a_full_disk_names_the_file(self, capsys: pytest.CaptureFixture[str]) -> None:
         def fail() -> None:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "results/a.png")

@@ -270,3 +270,12 @@ def test_a_definition_of_the_bags_own_is_not_followed(tmp_path: Path) -> None:
     path.write_bytes(data.replace(digest, b"0" * 32))
     with pytest.raises(RecordingError, match="its definition of sensor_msgs/msg/Imu is not the st"):
         open_robot(path, Source.MAV)
+
+
+@pytest.mark.parametrize("name", ["metadata.yaml", "a.mcap"])
+def test_a_bag_of_pipes_is_refused(tmp_path: Path, name: str) -> None:
+    path = flying(False).write(tmp_path / "a")
+    (path / name).unlink(missing_ok=True)
+    (path / name).symlink_to("/dev/zero")
+    with pytest.raises(RecordingError, match=r"(is a device|no such folder|holds no recording)"):
+        open_robot(path, Source.MAV)

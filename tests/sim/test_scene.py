@@ -88,3 +88,9 @@ def test_the_overlap_that_a_scene_states_is_the_one_it_gives(name: str) -> None:
     worlds = [build_world(scene, seed, pictures=False) for seed in (0, 1, 2)]
     overlaps = np.concatenate([overlap_along_flight(world) for world in worlds])
     assert float(np.median(overlaps)) == pytest.approx(scene.overlap_expected, abs=0.05)
+
+
+@pytest.mark.parametrize("text", ["a = " + "[" * 50_000, "a." * 10_000 + "b = 1"])
+def test_a_scene_nested_without_end_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match=r"deep\.toml: not valid TOML"):
+        parse_scene(text, "deep.toml")

@@ -20,10 +20,13 @@ from rosbags.typesys.store import Typestore
 
 from airground.core.arrays import I64
 from airground.errors import RecordingError
+from airground.io.input_files import SETTINGS_LIMIT, check_file
 
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 TRANSFORMS_DEFINITION = "geometry_msgs/TransformStamped[] transforms"
 ANY_DIGEST = "*"
+BAG_LIMIT = 1 << 40
+"""Largest file of a bag [byte]: a day of images without compression."""
 """What a bag of ROS 1 may state in place of a definition's digest."""
 
 
@@ -52,6 +55,7 @@ class Bag:
         self._is_ros1 = path.suffix == ".bag"
         self._types = _types(self._is_ros1)
         try:
+            _check_files(path)
             self._reader: Any = Reader1(path) if self._is_ros1 else Reader2(path)
             self._reader.open()
             topics = self._reader.topics.items()
@@ -154,6 +158,16 @@ def _types(is_ros1: bool) -> Typestore:
     if TRANSFORMS not in types.fielddefs:
         types.register(get_types_from_msg(TRANSFORMS_DEFINITION, TRANSFORMS))
     return types
+
+
+def _check_files(path: Path) -> None:
+    """Raise OSError if a bag, or a file in its folder, is no regular file, or its list is large."""
+    if not path.is_dir():
+        check_file(path, BAG_LIMIT)
+        return
+    check_file(path / "metadata.yaml", SETTINGS_LIMIT)
+    for file in path.iterdir():
+        check_file(file, BAG_LIMIT)
 
 
 def _damaged(path: Path, error: Exception) -> RecordingError:

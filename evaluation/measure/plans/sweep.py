@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
 from airground.errors import InputError
+from airground.io.input_files import parse_toml
 from evaluation.measure.plans.dials import Point, Subject, Value, turned
 from evaluation.measure.protocol.trials import Protocol
 from evaluation.measure.work.unit import Unit, grouped
@@ -123,7 +123,7 @@ def _parsed(word: str) -> Vary:
 def _values(text: str) -> list[Value]:
     """A value may hold commas of its own, as a list does."""
     try:
-        values: list[Value] = tomllib.loads(f"values = [{text}]")["values"]
-    except tomllib.TOMLDecodeError:
+        values: list[Value] = parse_toml(f"values = [{text}]")["values"]
+    except ValueError:
         values = [parsed_value(part) for part in text.split(",")]
     return values

@@ -85,3 +85,19 @@ def test_short_labels_name_only_what_differs() -> None:
 def test_a_label_states_every_part_of_the_condition() -> None:
     label = Condition("paper", "oracle with drift", "none", "search", "sigma 1").label()
     assert label == "preset paper (sigma 1), poses with drift, noise-free sensors, heading searched"
+
+
+def test_a_measurement_that_is_there_twice_is_refused(tmp_path: Path) -> None:
+    """Two runs of one flight, put together, have no one value for it."""
+    table = make_table(conditions=(BEST,))
+    twice = ResultTable.concat([table, table])
+    twice.write(tmp_path / "twice.parquet")
+    with pytest.raises(InputError, match=r"twice\.parquet: .* is there twice"):
+        ResultTable.read(tmp_path / "twice.parquet")
+
+
+def test_a_column_of_another_type_is_refused(tmp_path: Path) -> None:
+    frame = make_table(conditions=(BEST,)).frame
+    frame.assign(seed="many").to_parquet(tmp_path / "odd.parquet")
+    with pytest.raises(InputError, match=r"odd\.parquet: a column has values of a wrong type"):
+        ResultTable.read(tmp_path / "odd.parquet")

@@ -166,3 +166,9 @@ def test_the_screen_shows_our_numbers_beside_the_papers(table: ResultTable) -> N
     assert "within 0.25 m after 4" in text
     assert "89 %" in text
     assert "76 mm" in text
+
+
+def test_an_unknown_preset_is_refused() -> None:
+    table = ResultTable(make_table(conditions=(BEST,)).frame.assign(preset="odd"))
+    with pytest.raises(InputError, match="unknown preset 'odd'"):
+        build_summary(table, table.conditions()[0], RunInfo("0.1.0", "abc", 0, "some CPU", 2))

@@ -138,3 +138,12 @@ def test_the_robots_view_is_from_behind_the_robot(showcase: Showcase) -> None:
     centre = np.median(showcase.aerial_cloud.points, axis=0)
     assert np.linalg.norm(view.eye[:2] - centre[:2]) > np.linalg.norm(robot[:2] - centre[:2])
     assert view.eye[2] > robot[2]
+
+
+@pytest.mark.parametrize("kept", [0, 100, 5000])
+def test_a_file_that_is_cut_is_named(showcase: Showcase, tmp_path: Path, kept: int) -> None:
+    showcase.save(tmp_path)
+    file = tmp_path / "showcase.npz"
+    file.write_bytes(file.read_bytes()[:kept])
+    with pytest.raises(InputError, match=r"showcase\.npz: no readable showcase"):
+        Showcase.load(tmp_path)

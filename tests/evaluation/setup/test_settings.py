@@ -92,3 +92,8 @@ def test_missing_file_and_contradicting_presets(tmp_path: Path) -> None:
     assert resolve(file=file) == paper()
     with pytest.raises(ConfigError, match="is for preset 'paper'"):
         resolve("best", file)
+
+
+def test_a_value_nested_without_end_is_refused() -> None:
+    with pytest.raises(ConfigError, match=r"localization\.particles"):
+        resolve(overrides=["localization.particles=" + "[" * 50_000])
