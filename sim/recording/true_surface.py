@@ -37,7 +37,7 @@ class TrueSurface:
         try:
             check_file(path)
         except OSError as error:
-            raise RecordingError(f"{path}: cannot be read: {error.strerror}") from None
+            raise RecordingError(f"{path}: no readable mesh: {error.strerror}") from None
         with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
             mesh = o3d.io.read_triangle_mesh(path)
         if not mesh.has_triangles():
