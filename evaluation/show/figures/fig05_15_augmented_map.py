@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from airground.core.se3 import SE3
 from evaluation.measure.showcase import Showcase
 from evaluation.show.figures.scene_pictures import (
+    BACKGROUND,
     GROUND_COLOUR,
     GROUND_PATH,
     MAV_COLOUR,
@@ -22,18 +24,27 @@ from evaluation.show.figures.style import INK, WIDE_IN, picture_axes, styled
 
 CUT_M = 0.03
 """Thickness of the cut: about that of a few points of either map."""
+ADDED, BELIEVED = "added by the MAV", "aerial surface where last believed, not added"
+MARGIN_PX = 20
+"""Background around what a picture shows [px]."""
+FLATTEST = 2.0
+"""Largest width over height of a picture: flatter ones would be small beside each other."""
 ABOVE_FLOOR_M = 0.1
 """Points higher than this belong to the heap: well above the noise of the floor."""
 
 
 @styled
-def augmented_figure(robot_view: NDArray[np.uint8], aerial_view: NDArray[np.uint8]) -> Figure:
-    """Two rendered pictures, (height, width, 3) each, with a legend."""
-    height, width = robot_view.shape[:2]
-    figure = Figure(figsize=(WIDE_IN, WIDE_IN / 2 * height / width + 0.6), layout="constrained")
+def augmented_figure(
+    robot_view: NDArray[np.uint8], aerial_view: NDArray[np.uint8], aerial: str = ADDED
+) -> Figure:
+    """Two rendered pictures, (height, width, 3) each, with a legend; `aerial` names the points of
+    the MAV in it."""
+    pictures = [_without_margins(view) for view in (robot_view, aerial_view)]
+    aspects = [picture.shape[1] / picture.shape[0] for picture in pictures]
+    figure = Figure(figsize=(WIDE_IN, WIDE_IN / sum(aspects) + 0.6), layout="constrained")
     titles = ("a  from the ground robot's side", "b  from the aerial side")
-    panels = figure.subplots(1, 2)
-    for axes, picture, title in zip(panels, (robot_view, aerial_view), titles, strict=True):
+    panels = figure.subplots(1, 2, width_ratios=aspects)
+    for axes, picture, title in zip(panels, pictures, titles, strict=True):
         axes.imshow(picture)
         axes.set_title(title)
         picture_axes(axes)
@@ -43,13 +54,37 @@ def augmented_figure(robot_view: NDArray[np.uint8], aerial_view: NDArray[np.uint
         Line2D([], [], color=_share(colour), label=label, **look)
         for colour, label, look in (
             (GROUND_COLOUR, "ground robot's map", dot),
-            (MAV_COLOUR, "added by the MAV", dot),
+            (MAV_COLOUR, aerial, dot),
             (GROUND_PATH, "ground robot's path", line),
             (MAV_PATH, "MAV's path", line),
         )
     ]
     figure.legend(handles=entries, loc="outside lower center", ncols=4)
     return figure
+
+
+def as_believed(showcase: Showcase) -> Showcase:
+    """With the first aerial surface where the last belief places it, instead of added points."""
+    T_ground_mav = showcase.steps[-1].belief.T_ground_mav
+    surface = showcase.surface.cloud_mav
+    points = (T_ground_mav @ surface.points).astype(np.float32)
+    return replace(showcase, aerial_cloud=replace(surface, points=points))
+
+
+def _without_margins(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The part that shows something, with a margin, at least as high as wide by `FLATTEST`."""
+    drawn = (picture != np.array(BACKGROUND, np.uint8)).any(axis=2)
+    if not drawn.any():
+        return picture
+    spans = []
+    for axis, length in ((1, picture.shape[0]), (0, picture.shape[1])):
+        filled = np.flatnonzero(drawn.any(axis=axis))
+        spans.append([max(filled[0] - MARGIN_PX, 0), min(filled[-1] + 1 + MARGIN_PX, length)])
+    (top, bottom), (left, right) = spans
+    missing = int((right - left) / FLATTEST) - (bottom - top)
+    if missing > 0:
+        top = max(top - missing, 0)
+    return picture[top:bottom, left:right]
 
 
 @styled

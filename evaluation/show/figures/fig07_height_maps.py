@@ -17,6 +17,7 @@ from evaluation.measure.showcase import Showcase
 from evaluation.show.figures.style import (
     COST_COLOURS,
     HEIGHT_COLOURS,
+    HOLE,
     PAPER,
     WIDE_IN,
     colour_map,
@@ -30,7 +31,7 @@ COST_UNITS = {"zmssd": "ZMSSD [m²]", "ncc": "1 - correlation"}
 @styled
 def height_maps_figure(showcase: Showcase) -> Figure:
     """Aerial map, ground map with the aerial footprint at the best u, cost map."""
-    figure = Figure(figsize=(WIDE_IN, 3.3), layout="compressed")
+    figure = Figure(figsize=(WIDE_IN, 3.5), layout="constrained")
     aerial_axes, ground_axes, cost_axes = figure.subplots(1, 3)
     aerial, ground = showcase.aerial_heights, showcase.ground_heights
     step = showcase.steps[0]
@@ -63,9 +64,10 @@ def height_maps_figure(showcase: Showcase) -> Figure:
             markeredgewidth=1.4, linestyle="none", label="lowest cost",
         )  # fmt: skip
     mark_truth(cost_axes, step.true_u)
-    cost_axes.legend(loc="upper right", frameon=True, framealpha=0.9)
+    figure.legend(*cost_axes.get_legend_handles_labels(), loc="outside lower right", ncols=2)
     for axes in (aerial_axes, ground_axes, cost_axes):
         axes.set_xlabel("x [m]")
+        square_panel(axes)
     aerial_axes.set_ylabel("y [m]")
     return figure
 
@@ -90,6 +92,13 @@ def draw_grid(
         interpolation="nearest",
         **limits,
     )
+
+
+def square_panel(axes: Axes) -> None:
+    """Widen the shorter axis of a grid, so that panels of any extent have the same width."""
+    axes.set_box_aspect(1)
+    axes.set_adjustable("datalim")
+    axes.set_facecolor(HOLE)
 
 
 def draw_costs(axes: Axes, made: CostMap) -> AxesImage:

@@ -9,8 +9,8 @@ from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
 from evaluation.measure.showcase import LocalizationStep
-from evaluation.show.figures.fig07_height_maps import draw_costs, mark_truth
-from evaluation.show.figures.style import WIDE_IN, styled
+from evaluation.show.figures.fig07_height_maps import draw_costs, mark_truth, square_panel
+from evaluation.show.figures.style import HOLE, WIDE_IN, styled
 
 PARTICLES = "#35C46A"
 SIGMAS = 2.0
@@ -20,22 +20,28 @@ ZOOM_BELOW_M = 0.25
 """Particles with a smaller spread are also drawn enlarged."""
 ZOOM_M = 0.3
 """Half the side of the enlarged square."""
+ZOOM_SIDE = 0.36
+"""Side of the inset, as a share of its panel's."""
+LARGEST_PANEL_IN = 3.6
+"""Height of a panel that is alone [in]."""
 
 
 @styled
 def particles_figure(steps: tuple[LocalizationStep, ...]) -> Figure:
     """One panel per aerial map: cost map, particles, their covariance (2 sigma), the truth."""
-    figure = Figure(figsize=(WIDE_IN, WIDE_IN / len(steps) + 0.35), layout="constrained")
+    side = min(WIDE_IN / len(steps), LARGEST_PANEL_IN)
+    figure = Figure(figsize=(WIDE_IN, side + 0.75), layout="constrained")
     panels = figure.subplots(1, len(steps), squeeze=False)[0]
     for number, (axes, step) in enumerate(zip(panels, steps, strict=True), 1):
         _draw_step(axes, step)
         error = float(np.linalg.norm(step.belief.estimate[:2] - step.true_u))
-        axes.set_title(f"{number}  error {error:.2f} m, spread {step.belief.spread_m:.2f} m")
+        axes.set_title(f"{number}  error {error:.2f} m\nspread {step.belief.spread_m:.2f} m")
         axes.set_xlabel("x [m]")
+        square_panel(axes)
         if step.belief.spread_m < ZOOM_BELOW_M:
             _zoom(axes, step)
     panels[0].set_ylabel("y [m]")
-    panels[0].legend(loc="upper left", frameon=True, framealpha=0.9)
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower right", ncols=2)
     return figure
 
 
@@ -53,14 +59,16 @@ def _draw_step(axes: Axes, step: LocalizationStep) -> None:
 
 
 def _zoom(axes: Axes, step: LocalizationStep) -> None:
-    """A square of 0.6 m around the truth, in the corner farthest from it."""
-    x, y = step.true_u
-    left, right, bottom, top = *axes.get_xlim(), *axes.get_ylim()
-    column = 0.62 if x < (left + right) / 2 else 0.02
-    row = 0.62 if y < (bottom + top) / 2 else 0.02
-    inset = axes.inset_axes((column, row, 0.36, 0.36))
+    """A square of 0.6 m around the estimate, in the corner farthest from estimate and truth."""
+    limits = np.array([axes.get_xlim(), axes.get_ylim()])
+    u = step.belief.estimate[:2]
+    marks = (np.array([u, step.true_u]) - limits[:, 0]) / np.ptp(limits, axis=1)
+    corners = np.array([[x, y] for y in (0.62, 0.02) for x in (0.62, 0.02)])
+    distances = np.linalg.norm(corners[:, None] + ZOOM_SIDE / 2 - marks, axis=2)
+    inset = axes.inset_axes((*corners[distances.min(axis=1).argmax()], ZOOM_SIDE, ZOOM_SIDE))
     _draw_step(inset, step)
-    inset.set(xlim=(x - ZOOM_M, x + ZOOM_M), ylim=(y - ZOOM_M, y + ZOOM_M), xticks=[], yticks=[])
+    (left, bottom), (right, top) = u - ZOOM_M, u + ZOOM_M
+    inset.set(xlim=(left, right), ylim=(bottom, top), xticks=[], yticks=[], facecolor=HOLE)
     for spine in inset.spines.values():
         spine.set_visible(True)
     axes.indicate_inset_zoom(inset, edgecolor="black", alpha=0.7)

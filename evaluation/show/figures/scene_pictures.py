@@ -81,6 +81,11 @@ def aerial_viewpoint(showcase: Showcase) -> Viewpoint:
     if len(showcase.aerial_cloud):
         shown.append(np.percentile(showcase.aerial_cloud.points, [1, 99], axis=0))
     points = np.concatenate(shown) - target
+    # The middle of everything in the picture's plane, so that no side stays empty.
+    for along in (right, up):
+        middle = 0.5 * ((points @ along).min() + (points @ along).max())
+        points = points - middle * along
+        target = target + middle * along
     reach = np.maximum(np.abs(points @ up), np.abs(points @ right) / (SIZE_PX[0] / SIZE_PX[1]))
     distance = (points @ back + 1.06 * reach / np.tan(FIELD_OF_VIEW / 2)).max()
     return Viewpoint(target + distance * back, target)

@@ -7,10 +7,16 @@ from collections.abc import Iterator
 from evaluation.measure.baselines.matched_images import MatchedImages
 from evaluation.measure.showcase import Showcase
 from evaluation.show.figures.fig02_03_matches import DRAWN, matches_figure, views_figure
-from evaluation.show.figures.fig05_15_augmented_map import augmented_figure, refinement_figure
+from evaluation.show.figures.fig05_15_augmented_map import (
+    ADDED,
+    BELIEVED,
+    as_believed,
+    augmented_figure,
+    refinement_figure,
+)
 from evaluation.show.figures.fig06_depth_maps import depth_maps_figure
 from evaluation.show.figures.fig07_height_maps import height_maps_figure
-from evaluation.show.figures.fig08_particles import particles_figure
+from evaluation.show.figures.fig08_particles import ZOOM_M, particles_figure
 from evaluation.show.figures.scene_pictures import (
     aerial_viewpoint,
     render_augmented_map,
@@ -30,16 +36,7 @@ def showcase_figures(showcase: Showcase) -> Iterator[ReportFigure]:
     )
     if showcase.matched is not None:
         yield _matches(showcase.matched, conditions)
-    yield ReportFigure(
-        "fig05_15_augmented",
-        "Fig. 5 and 15: the augmented map",
-        "Red: the ground robot's map. Grey: points added by the MAV after refinement. Pyramids "
-        f"mark cameras along the paths. {conditions}",
-        augmented_figure(
-            render_augmented_map(showcase, robot_viewpoint(showcase)),
-            render_augmented_map(showcase, aerial_viewpoint(showcase)),
-        ),
-    )
+    yield _augmented(showcase, conditions)
     yield ReportFigure(
         "fig06_depth_maps",
         "Fig. 6: depth maps and their fusion",
@@ -60,7 +57,8 @@ def showcase_figures(showcase: Showcase) -> Iterator[ReportFigure]:
         "fig08_particles",
         "Fig. 8: particles over successive aerial maps",
         "Green: particles after the update with each map. White: their covariance (2 sigma). "
-        f"Cross: true position. Background: cost of every position. {conditions}",
+        "Cross: true position. Background: cost of every position. Inset: "
+        f"{200 * ZOOM_M:.0f} cm around the estimate, where the spread is small. {conditions}",
         particles_figure(showcase.steps),
     )
     if showcase.T_ground_mav is not None:
@@ -72,6 +70,28 @@ def showcase_figures(showcase: Showcase) -> Iterator[ReportFigure]:
             f"paper shows no such picture. {conditions}",
             refinement_figure(showcase, showcase.T_ground_mav),
         )
+
+
+def _augmented(showcase: Showcase, conditions: str) -> ReportFigure:
+    """The augmented map; where nothing was added, the surface where it was last believed."""
+    nothing = len(showcase.aerial_cloud) == 0
+    shown = as_believed(showcase) if nothing else showcase
+    grey = (
+        "Nothing was added to it: no alignment was accepted. Grey: the first aerial surface where "
+        "the last belief drawn in Fig. 8 places it."
+        if nothing
+        else "Grey: points added by the MAV after refinement."
+    )
+    return ReportFigure(
+        "fig05_15_augmented",
+        "Fig. 5 and 15: the augmented map",
+        f"Red: the ground robot's map. {grey} Pyramids mark cameras along the paths. {conditions}",
+        augmented_figure(
+            render_augmented_map(shown, robot_viewpoint(shown)),
+            render_augmented_map(shown, aerial_viewpoint(shown)),
+            BELIEVED if nothing else ADDED,
+        ),
+    )
 
 
 def _matches(matched: MatchedImages, conditions: str) -> ReportFigure:

@@ -55,7 +55,7 @@ def timing_figure(durations_ms: dict[str, NDArray[np.float64]]) -> Figure:
     axes.set_xscale("log")
     axes.set_xlim(0.1, 2e4)
     _label_rows(axes, [stage.title for stage in stages], "time [ms]")
-    axes.bar(0, 0, **BAR, label="measured: median, whisker to 95 %")
+    axes.barh([], [], **BAR, label="measured: median, whisker to 95 %")
     axes.plot([], [], "D", color=PAPER, label="paper, CPU")
     axes.plot([], [], "D", color=PAPER, markerfacecolor="white", label="paper, GPU")
     figure.legend(loc="outside upper left", ncols=3)

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
-from evaluation.measure.showcase import Showcase
+from evaluation.measure.showcase import LocalizationStep, Showcase
 from evaluation.show.figures.boxes import draw_boxes, log_axis
-from evaluation.show.figures.fig05_15_augmented_map import refinement_figure
+from evaluation.show.figures.fig05_15_augmented_map import as_believed, refinement_figure
 from evaluation.show.figures.fig06_depth_maps import completeness, depth_maps_figure
 from evaluation.show.figures.fig07_height_maps import draw_grid, height_maps_figure
 from evaluation.show.figures.fig08_particles import ellipse_points, particles_figure
@@ -23,7 +23,16 @@ from evaluation.show.figures.fig13_14_refinement_error import (
     BeforeAfter,
     refinement_translation_figure,
 )
-from evaluation.show.figures.style import COLUMN_IN, SMALL_PT, WIDE_IN, save_figure
+from evaluation.show.figures.scene_pictures import BACKGROUND
+from evaluation.show.figures.showcase_figures import showcase_figures
+from evaluation.show.figures.style import (
+    COLUMN_IN,
+    PICTURE_DPI,
+    SMALL_PT,
+    WIDE_IN,
+    save_figure,
+    save_picture,
+)
 from evaluation.show.figures.table1_timing import timing_figure
 from evaluation.show.report.figures import report_figures
 from tests.evaluation.synthetic_results import BEST, PAPER, make_showcase, make_table
@@ -174,6 +183,80 @@ def test_every_figure_fits_a_paper(showcase: Showcase, tmp_path: Path) -> None:
         assert b"/FontFile2" in pdf, one.name
         sizes = font_sizes_pt(pdf)
         assert min(sizes) >= SMALL_PT, (one.name, sorted(sizes))
+        assert overhang_in(one.figure) < CUT_IN, one.name
+
+
+@pytest.fixture(scope="module")
+def lost(showcase: Showcase) -> Showcase:
+    """The same flight with particles together in a wrong place, and nothing aligned."""
+    wrong = np.array([1.4, -0.9])
+
+    def moved(step: LocalizationStep) -> LocalizationStep:
+        belief = step.belief
+        particles, estimate = belief.particles.copy(), belief.estimate.copy()
+        estimate[:2] = step.true_u + wrong
+        particles[:, :2] = estimate[:2] + 0.02 * np.sin(particles[:, :2] * 1e3)
+        covariance = np.diag([4e-4, 4e-4])
+        changed = dataclasses.replace(
+            belief, particles=particles, estimate=estimate, covariance=covariance
+        )
+        return dataclasses.replace(step, belief=changed)
+
+    return dataclasses.replace(
+        showcase,
+        steps=tuple(map(moved, showcase.steps)),
+        aerial_cloud=PointCloud(np.zeros((0, 3), np.float32), np.zeros((0, 3), np.uint8)),
+        T_ground_mav=None,
+    )
+
+
+CUT_IN = 0.02
+"""What a figure's text may reach beyond its edge [in]: about a pixel of its picture's width in a
+page, and the rounding of text to pixels."""
+
+
+def overhang_in(figure: Figure) -> float:
+    """How far the drawing reaches beyond the figure's edges [in]."""
+    figure.set_dpi(PICTURE_DPI)
+    box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
+    return max(-box.x0, -box.y0, box.x1 - width, box.y1 - height)
+
+
+def test_what_is_cut_off_is_noticed(tmp_path: Path) -> None:
+    figure = Figure(figsize=(2, 2), layout="constrained")
+    figure.subplots().set_title("a title that is much longer than its axes", loc="left")
+    save_picture(figure, tmp_path, "long")
+    assert overhang_in(figure) > 0.5
+
+
+def test_the_inset_shows_the_particles_where_they_are_wrong(lost: Showcase) -> None:
+    (panel, *_) = particles_figure(lost.steps).axes
+    (inset,) = panel.child_axes
+    (left, right), (bottom, top) = inset.get_xlim(), inset.get_ylim()
+    x, y = lost.steps[0].belief.particles[:, :2].T
+    assert ((x > left) & (x < right) & (y > bottom) & (y < top)).all()
+
+
+def test_without_an_alignment_the_surface_stands_where_it_was_believed(lost: Showcase) -> None:
+    shown = as_believed(lost)
+    assert len(shown.aerial_cloud) == len(lost.surface.cloud_mav)
+    T_mav_ground = lost.steps[-1].belief.T_ground_mav.inverse()
+    back = T_mav_ground @ shown.aerial_cloud.points
+    np.testing.assert_allclose(back, lost.surface.cloud_mav.points, atol=1e-4)
+
+
+def test_the_figures_of_a_failed_run_are_filled_and_not_cut(lost: Showcase, tmp_path: Path) -> None:
+    drawn = {one.name: one for one in showcase_figures(lost)}
+    assert "refinement" not in drawn
+    for name, one in drawn.items():
+        save_picture(one.figure, tmp_path, name)
+        assert overhang_in(one.figure) < CUT_IN, name
+    augmented = drawn["fig05_15_augmented"]
+    assert "Nothing was added" in augmented.caption
+    for axes in augmented.figure.axes:
+        (picture,) = axes.images
+        filled = (np.asarray(picture.get_array()) != BACKGROUND).any(axis=2)
+        assert filled.mean() > 0.3
 
 
 def font_sizes_pt(pdf: bytes) -> set[float]:
