@@ -153,3 +153,36 @@ def test_real_lenses_do_not_fold(name: str) -> None:
 @pytest.mark.parametrize("name", LENSES)
 def test_lenses_that_can_be_undone_do_not_fold(name: str) -> None:
     assert not LENSES[name].folds()
+
+
+@pytest.mark.parametrize("name", [name for name in LENSES if "195" not in name])
+def test_rays_and_pixels_are_each_others_inverse(name: str) -> None:
+    lens = LENSES[name]
+    rays = lens.rays()
+    # Not up to the corners, where "k3" turns back.
+    rows, columns = np.mgrid[30 : HEIGHT - 30 : 30, 30 : WIDTH - 30 : 30].reshape(2, -1)
+    asked = rays[rows, columns]
+    np.testing.assert_allclose(lens.project(3 * asked), np.stack([columns, rows], 1), atol=1e-6)
+    for ray, pixel in zip(asked, lens.project(asked), strict=True):
+        np.testing.assert_allclose(project(lens, ray), pixel, atol=1e-6)
+
+
+def test_nothing_is_seen_beyond_the_corners_or_behind() -> None:
+    lens = LENSES["k3"]
+    assert np.isnan(lens.project(np.array([[4.0, 0, 1], [0, 0, -1], [0, 0, 0]]))).all()
+
+
+@pytest.mark.parametrize("name", ["k3", "fisheye"])
+def test_opencv_undistorts_images_as_we_do(name: str) -> None:
+    """cv2.undistort and cv2.fisheye.undistortImage, with the matrix that we choose."""
+    lens = LENSES[name]
+    rng = np.random.default_rng(0)
+    image = cv2.GaussianBlur(rng.integers(0, 256, (HEIGHT, WIDTH), np.uint8), (0, 0), 3)
+    ours = Undistortion(lens)
+    given = lens.matrix(), np.array(lens.distortion)
+    if lens.model == "equidistant":
+        theirs = cv2.fisheye.undistortImage(image, *given, Knew=ours.camera.matrix())
+    else:
+        theirs = cv2.undistort(image, *given, newCameraMatrix=ours.camera.matrix())
+    difference = np.abs(ours.image(image).astype(int) - theirs.astype(int))
+    assert difference[2:-2, 2:-2].max() <= 1

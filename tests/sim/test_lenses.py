@@ -1,5 +1,7 @@
 """What a pixel shows is what its own ray hits, through every lens and with a rolling shutter."""
 
+from dataclasses import replace
+
 import cv2
 import mujoco
 import numpy as np
@@ -14,11 +16,14 @@ from sim.recording.render import Renderer, with_cameras
 from sim.recording.robot_view import RobotView
 from sim.recording.row_poses import exact_row_poses
 from sim.recording.view_tiles import tiles_of
-from sim.robots.motion import Motion, Robot
+from sim.robots.motion import ROBOTS, Motion, Robot
+from sim.robots.robot_motion import Mounting
 from sim.sensors.camera import pixel_motion
 from sim.sensors.depth import incidence_angles
+from sim.sensors.miscalibration import calibrate
 from sim.sensors.optics import EUROC_RADTAN, FISHEYE_FIELD_DEG, LensKind, Optics
 from sim.sensors.pixel_rays import PixelRays
+from sim.sensors.presets import NOMINAL
 from tests.sim.heap import POSES, Heap, empty_spec, make_heap
 
 PINHOLE = CameraTable(
@@ -207,3 +212,20 @@ def test_the_fisheye_has_its_field_from_corner_to_corner() -> None:
     rays = lens.rays()[[0, -1], [0, -1]]
     rays /= np.linalg.norm(rays, axis=1, keepdims=True)
     assert np.degrees(np.arccos(rays[0] @ rays[1])) == pytest.approx(FISHEYE_FIELD_DEG, abs=0.6)
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.5, 1.0, 1.5])
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_pixel_of_every_strength_has_a_ray_of_its_own(
+    kind: LensKind, robot: Robot, factor: float
+) -> None:
+    mounting = Mounting(SE3.identity(), SE3.identity())
+    optics = Optics(kind, factor)
+    preset = replace(NOMINAL, mav_optics=optics, ground_optics=optics)
+    drawn = calibrate(420.0, mounting, mounting, preset, np.random.default_rng(0))
+    for table in (drawn.true, drawn.nominal):
+        lens = (table.mav if robot == "mav" else table.ground).camera.lens()
+        pixels = lens.project(lens.rays()[::7, ::9].reshape(-1, 3))
+        rows, columns = np.mgrid[0 : lens.height : 7, 0 : lens.width : 9].reshape(2, -1)
+        assert np.abs(pixels - np.stack([columns, rows], axis=1)).max() < 1e-4

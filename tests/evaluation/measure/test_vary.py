@@ -112,6 +112,8 @@ def test_dials_turn_what_they_name() -> None:
         "scene.texture": 0.2,
         "scene.printed": 0.4,
         "sensors.noise": 2.0,
+        "sensors.readout_ms": 20.0,
+        "sensors.distortion": 0.5,
         "sensors.heading_error_deg": 5.0,
         "height_maps.cells_per_m": 50.0,
     }
