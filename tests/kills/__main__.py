@@ -54,6 +54,8 @@ def main() -> int:
     words.add_argument("--count", type=int, default=12, help="kills of each verb")
     words.add_argument("--seed", type=int, default=0, help="seed of the moments")
     asked = words.parse_args()
+    # Ignored, as a shell sets it for what runs in the background, the commands would inherit it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     lost = 0
     with tempfile.TemporaryDirectory(prefix="airground-kills-") as name:
         folder = Path(name)

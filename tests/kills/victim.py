@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 SHARED = Path("/dev/shm")
+NAMES = ("psm_*", "sem.*")
+"""Names that Python gives to shared memory and semaphores; other programs have others."""
 MAIN = "from evaluation.cli import main; main()"
 END_S = 20.0
 """Longest time until the processes of a killed command have ended [s]."""
@@ -64,7 +66,7 @@ class Command:
         Returns:
             Exit code, and what is left when all has ended.
         """
-        before = {path.name for path in SHARED.iterdir()}
+        before = shared_names()
         process = self.start()
         try:
             process.wait(after_s)
@@ -82,13 +84,17 @@ class Command:
         processes = tuple(name_of(pid) for pid in session(process.pid))
         for pid in session(process.pid):
             os.kill(pid, signal.SIGKILL)
-        shared = {path.name for path in SHARED.iterdir()} - before
+        shared = shared_names() - before
         temporary = tuple(path.name for path in (self.folder / "tmp").iterdir())
         beside = {path.name for path in self.folder.iterdir()} - {"tmp", "stderr", self.out}
         return code, Left(processes, tuple(shared), temporary, tuple(beside))
 
     def whole(self) -> bool:
         return (self.folder / self.out).exists()
+
+
+def shared_names() -> set[str]:
+    return {path.name for pattern in NAMES for path in SHARED.glob(pattern)}
 
 
 def session(leader: int) -> list[int]:
