@@ -23,8 +23,10 @@ from evaluation.show.report.calibration import calibration_table, claims_table
 from evaluation.show.report.error_budget import budget_table
 from evaluation.show.report.failures import control_table, failures
 from evaluation.show.report.figures import report_figures
+from evaluation.show.report.files import beside, write_behind, write_latex
 from evaluation.show.report.reproduction import reproduction_table
 from evaluation.show.report.screen import live_table
+from evaluation.show.report.seen import is_chart, seen
 from evaluation.show.report.tables import comparison_table, headlines, scene_table, timing_table
 from evaluation.show.report.trajectories import trajectory_table
 from evaluation.table.limits import FOURTH_MAP, GOOD_POSE, LOCATED_M
@@ -51,7 +53,7 @@ def write_report(
     run: RunInfo,
     notes: Sequence[str] = (),
 ) -> None:
-    """Write `report.html` and `figures/` (PNG and PDF) into `out`.
+    """Write `report.html`, `figures/` (PNG, PDF, CSV) and `tables/` (LaTeX) into `out`.
 
     The primary condition, those of the other preset and then the rest are drawn side by side
     (four at most); all stand in the comparison.
@@ -66,28 +68,33 @@ def write_report(
     shown = table.conditions()
     primary = table.of(shown[0])
     measured = primary.scored()
+    tables = {
+        "reproduction": reproduction_table(table, shown),
+        "comparison": comparison_table(table, shown),
+        "trajectories": trajectory_table(table, shown),
+        "budget": budget_table(measured),
+        "baselines": baseline_table(primary),
+        "claims": claims_table(primary),
+        "calibration": calibration_table(measured),
+        "timing": timing_table(measured),
+        "live": live_table(measured),
+        "by_scene": scene_table(measured),
+        "controls": control_table(table, shown),
+    }
     page = rendered(
         "report.html.j2",
         condition=shown[0].label(),
         scenes=measured.scenes(),
         run=run,
         headlines=headlines(measured),
-        reproduction=reproduction_table(table, shown),
-        comparison=comparison_table(table, shown),
         shared=shared_parts(shown) if len(shown) > 1 else shown[0].label(),
-        pictures=[saved_picture(f, out) for f in report_figures(table, shown, showcase)],
-        trajectories=trajectory_table(table, shown),
-        budget=budget_table(measured),
-        baselines=baseline_table(primary),
-        claims=claims_table(primary),
-        calibration=calibration_table(measured),
-        timing=timing_table(measured),
-        live=live_table(measured),
-        by_scene=scene_table(measured),
-        controls=control_table(table, shown),
+        pictures=[saved_picture(f, out, table) for f in report_figures(table, shown, showcase)],
+        files=write_latex(out, tables),
+        beside=beside(out),
         failures=failures(measured),
         notes=list(notes),
         platform=published.PLATFORM,
+        **tables,
     )
     (out / "report.html").write_text(page, encoding="utf-8")
 
@@ -98,19 +105,32 @@ WEBP_QUALITY = 88
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure as a page embeds it."""
+    """A figure as a page embeds it.
+
+    Attributes:
+        name, title, caption, wide: Those of the figure.
+        seen: What is seen, in words.
+        chart: Whether its colours may be inverted.
+        files: Names of its files, relative to the page.
+        data_uri: The picture.
+        width, height: Its size [px].
+    """
 
     name: str
     title: str
     caption: str
     wide: bool
+    seen: str
+    chart: bool
+    files: tuple[str, ...]
     data_uri: str
     width: int
     height: int
 
 
-def saved_picture(drawn: ReportFigure, out: Path) -> Picture:
-    """Save a figure into `figures/` of a folder, and pack it for the page."""
+def saved_picture(drawn: ReportFigure, out: Path, table: ResultTable | None = None) -> Picture:
+    """Save a figure into `figures/` of a folder, and pack it for the page; with the table, also the
+    rows behind it."""
     save_figure(drawn.figure, out / "figures", drawn.name)
     with Image.open(out / "figures" / f"{drawn.name}.png") as opened:
         image = opened.convert("RGB")
@@ -120,8 +140,18 @@ def saved_picture(drawn: ReportFigure, out: Path) -> Picture:
     packed = io.BytesIO()
     image.save(packed, "WEBP", quality=WEBP_QUALITY, method=4)
     data_uri = "data:image/webp;base64," + base64.b64encode(packed.getvalue()).decode("ascii")
+    behind = write_behind(out, drawn.name, table) if table is not None else ""
     return Picture(
-        drawn.name, drawn.title, drawn.caption, drawn.wide, data_uri, image.width, image.height
+        name=drawn.name,
+        title=drawn.title,
+        caption=drawn.caption,
+        wide=drawn.wide,
+        seen=seen(drawn.figure),
+        chart=is_chart(drawn.figure),
+        files=(f"figures/{drawn.name}.pdf", *([behind] if behind else [])),
+        data_uri=data_uri,
+        width=image.width,
+        height=image.height,
     )
 
 

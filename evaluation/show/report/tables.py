@@ -33,6 +33,11 @@ SEQUENCES, TRIALS = f"{published.SEQUENCES.value:g}", f"{published.REFINEMENT_TR
 """The paper's counts."""
 
 
+FEW = 10
+"""Fewer cases are shown as counts: for less than ten the 95 % interval of any share is wider than
+a quarter, and a bootstrap of their median is too narrow."""
+
+
 @dataclass(frozen=True)
 class Headline:
     """One of the numbers that a reader looks for first: its value here with number of cases and
@@ -72,13 +77,21 @@ def _headline(metric: Metric, table: ResultTable) -> Headline | None:
     if made.count == 0:
         return None
     paper = "not given" if metric.published is None else metric.paper
+    each = metric.each if made.count == 1 else f"{metric.each}s"
     if metric.share:
         found = rate(metric, table)
-        interval = f"{100 * found.low:.0f} to {100 * found.high:.0f} %"
-        detail = f"{found.successes} of {found.total} {metric.each}s; 95 %: {interval}"
+        counts = f"{found.successes} of {found.total}"
+        interval = f"95 %: {100 * found.low:.0f} to {100 * found.high:.0f} %"
+        if found.total < FEW:
+            return Headline(metric.title, counts, f"{each}; {interval}", f"paper: {paper}")
+        detail = f"{counts} {each}; {interval}"
         return Headline(metric.title, percent(made.value, 0), detail, f"paper: {paper}")
-    interval = f"{metric.text(made.low)} to {metric.text(made.high)}"
-    detail = f"median of {made.count} {metric.each}s; 95 %: {interval}"
+    detail = f"of {made.count} {each} only"
+    if made.count >= FEW:
+        interval = f"{metric.text(made.low)} to {metric.text(made.high)}"
+        detail = f"median of {made.count} {each}; 95 %: {interval}"
+    elif made.count > 1:
+        detail = f"median {detail}"
     return Headline(metric.title, metric.text(made.value), detail, f"paper: {paper}")
 
 

@@ -78,13 +78,13 @@ def comparison(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_report_fits_the_window(report: Path, opened: Browser, size: str) -> None:
     assert headings(opened, report, size) == [
         "Conditions compared",
+        "Failures",
         "Figures",
         "Claims",
         "Calibration",
         "Table I: timing",
         "Scene by scene",
         "Where there is nothing to find",
-        "Failures",
         "Notes",
     ]
     check(opened, size)

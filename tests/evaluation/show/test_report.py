@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from PIL import Image
 
@@ -38,8 +39,12 @@ def page(table: ResultTable, tmp_path_factory: pytest.TempPathFactory) -> tuple[
 
 
 def test_the_page_needs_nothing_from_outside(page: tuple[Path, str]) -> None:
-    _, html = page
-    assert re.findall(r'(?:src|href)="(?!data:|#)[^"]*"', html) == []
+    out, html = page
+    assert re.findall(r'src="(?!data:)[^"]*"', html) == []
+    links = re.findall(r'href="(?!#)([^"]*)"', html)
+    made_later = {"results.parquet", "summary.json", "config.toml"}
+    assert made_later < set(links)
+    assert {name for name in links if not (out / name).is_file()} == made_later
     assert "<script" not in html
     assert not re.search(r"url\(|@import", html)
 
@@ -197,6 +202,51 @@ def test_the_timing_table_says_what_was_not_run(table: ResultTable) -> None:
     rows = {row[0]: row for row in timing_table(table.of(BEST)).rows}
     assert rows["Egomotion: Monocular SLAM, a frame"][1:] == ("14 (CPU)", "not run", "-", "-", "0")
     assert rows["Dense reconstruction: Fusion, 8 iterations"][1] == "800 (GPU)"
+
+
+def test_few_cases_are_no_percentage(table: ResultTable) -> None:
+    frame = table.of(BEST).scored().frame
+    one = frame[(frame["scene"] == "indoor_a") & (frame["flight"] == 0)]
+    one = one[(one["sequence"].fillna(0) < 1) & (one["trial"].fillna(0) < 1)]
+    tiles = {line.title: line for line in headlines(ResultTable(one))}
+    assert tiles["within 0.25 m after 4 maps"].value in ("0 of 1", "1 of 1")
+    assert not any("%" in line.value for line in tiles.values())
+    assert tiles["refined position"].detail == "of 1 trial only"
+
+
+def test_failures_come_before_the_figures(page: tuple[Path, str], tmp_path: Path) -> None:
+    _, html = page
+    assert 0 < html.index('id="failures"') < html.index('id="figures"')
+    assert html.count('id="failures"') == html.count('href="#failures"') == 1
+
+
+def test_every_table_has_a_caption_and_a_file_for_latex(page: tuple[Path, str]) -> None:
+    out, html = page
+    assert html.count("<table") == html.count("<caption>")
+    made = {path.stem: path.read_text(encoding="utf-8") for path in (out / "tables").iterdir()}
+    assert {"comparison", "timing", "by_scene", "claims", "calibration"} <= set(made)
+    for text in made.values():
+        assert text.startswith(r"\begin{tabular}")
+        assert r"\bottomrule" in text
+        assert not re.search(r"(?<!\\)[%_#$°]", text)
+
+
+def test_the_values_behind_a_figure_are_beside_it(page: tuple[Path, str]) -> None:
+    out, _ = page
+    errors = pd.read_csv(out / "figures" / "fig11_localization_error.csv")
+    assert set(errors["metric"]) == {"error_m"}
+    assert {path.stem for path in (out / "figures").glob("*.csv")} == {
+        path.stem for path in (out / "figures").glob("*.pdf")
+    }
+
+
+def test_alternative_texts_say_what_is_seen(page: tuple[Path, str]) -> None:
+    _, html = page
+    texts = re.findall(r'<img [^>]*alt="([^"]*)"', html)
+    (fig11,) = [text for text in texts if "% of sequences within 0.25 m" in text]
+    assert fig11.startswith("3 panels: ")
+    assert "preset best" in fig11
+    assert "iteration (number of aerial maps)" in fig11
 
 
 def test_headlines_leave_out_what_was_not_measured(table: ResultTable) -> None:
