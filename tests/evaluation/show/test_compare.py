@@ -156,7 +156,7 @@ def test_the_command_writes_a_page_that_needs_nothing_else(
     assert "1 worse: surface, median error" in capsys.readouterr().out
     html = (tmp_path / "out" / PAGE).read_text(encoding="utf-8")
     assert "new against a$&lt;old&gt;" in html
-    assert re.findall(r'(?:src|href)="(?!data:|#)[^"]*"', html) == []
+    assert re.findall(r'(?:src|href)="(?!data:|#|figures/)[^"]*"', html) == []
     assert "<script" not in html
     assert (tmp_path / "out" / "figures" / "paired_differences.pdf").is_file()
 
