@@ -27,7 +27,7 @@ def blocks(page: str, language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
 
 
-(SCENE,) = blocks("add_a_scene.md", "toml")
+SCENE = blocks("add_a_scene.md", "toml")[-1]
 FUNCTION, LINE = blocks("add_a_baseline.md", "python")[:2]
 
 
