@@ -26,6 +26,8 @@ AIRGROUND = """#!/usr/bin/env bash
 if [ "$1" = reproduce ]; then exec cp -r "{prepared}" "${{@: -1}}"; fi
 PYTHONPATH="{root}" exec "{python}" -c "from evaluation.cli import main; main()" "$@"
 """
+LONGEST_STEP_S = 600
+"""None waits for anything but work; two busy cores take a minute."""
 EXPRESSION = re.compile(r"\$\{\{\s*([\w.-]+)\s*\}\}")
 
 
@@ -71,6 +73,7 @@ class Runner:
             ["bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", step["run"]],
             env=os.environ | runner | given,
             cwd=self.folder / "workspace",
+            timeout=LONGEST_STEP_S,
         )
         for line in out.read_text().splitlines():
             name, _, value = line.partition("=")
