@@ -261,6 +261,17 @@ def test_truncated_bags_are_named_in_one_line(tmp_path: Path, ros1: bool, kept: 
     assert "\n" not in str(raised.value)
 
 
+@pytest.mark.parametrize("begin", [b"", b"#ROSBAG V2.0", b"#ROSBAG V1.2\n"])
+def test_a_bag_of_ros_1_is_known_by_its_first_line(tmp_path: Path, begin: bytes) -> None:
+    """That line may be the whole file: reading it to its end would take all memory."""
+    path = tmp_path / "a.bag"
+    with path.open("wb") as file:
+        file.write(begin)
+        file.truncate(2**33)
+    with pytest.raises(RecordingError, match=r"a\.bag: does not begin with #ROSBAG V2\.0, as bags"):
+        open_robot(path, Source.MAV)
+
+
 def test_a_definition_of_the_bags_own_is_not_followed(tmp_path: Path) -> None:
     """Its digest differs from the standard one's."""
     path = flying(True).write(tmp_path / "a.bag")

@@ -25,9 +25,11 @@ from airground.io.input_files import SETTINGS_LIMIT, check_file
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 TRANSFORMS_DEFINITION = "geometry_msgs/TransformStamped[] transforms"
 ANY_DIGEST = "*"
+"""What a bag of ROS 1 may state in place of a definition's digest."""
+ROS1_BEGINS = b"#ROSBAG V2.0\n"
+"""The library reads the first line of a bag, and a file of something else may be all one line."""
 BAG_LIMIT = 1 << 40
 """Largest file of a bag [byte]: a day of images without compression."""
-"""What a bag of ROS 1 may state in place of a definition's digest."""
 
 
 @dataclass(frozen=True)
@@ -161,13 +163,23 @@ def _types(is_ros1: bool) -> Typestore:
 
 
 def _check_files(path: Path) -> None:
-    """Raise OSError if a bag, or a file in its folder, is no regular file, or its list is large."""
+    """Raise OSError if a bag, or a file in its folder, is no regular file, or its list is large;
+    RecordingError if a bag of ROS 1 does not begin as one."""
     if not path.is_dir():
         check_file(path, BAG_LIMIT)
+        if path.suffix == ".bag":
+            _check_begin(path)
         return
     check_file(path / "metadata.yaml", SETTINGS_LIMIT)
     for file in path.iterdir():
         check_file(file, BAG_LIMIT)
+
+
+def _check_begin(path: Path) -> None:
+    with path.open("rb") as file:
+        if file.read(len(ROS1_BEGINS)) != ROS1_BEGINS:
+            begins = ROS1_BEGINS.decode().strip()
+            raise RecordingError(f"{path}: does not begin with {begins}, as bags of ROS 1 do")
 
 
 def _damaged(path: Path, error: Exception) -> RecordingError:
