@@ -88,11 +88,12 @@ def assert_no_silent_jump(sequence: Sequence, tracked: list[TrackedPose]) -> Non
 
 
 def _longest_step(before: TrackedPose) -> float:
-    """A correction [m] is no error while scale and vertical are stated as uncertain."""
+    """A step that is not silent [m]: a correction of a scale that was stated as uncertain. The map
+    begins in the origin, so that the scale moves the camera by its share of the distance there."""
     if before.scale is None or before.scale.sigma < SETTLED_SIGMA:
         return MAX_STEP_ERROR_M
-    assert before.covariance is not None
-    return max(MAX_STEP_ERROR_M, float(np.sqrt(np.trace(before.covariance[:3, :3]))))
+    far_m = float(np.linalg.norm(_given(before).translation))
+    return max(MAX_STEP_ERROR_M, before.scale.sigma * far_m)
 
 
 def _given(pose: TrackedPose) -> SE3:
