@@ -85,7 +85,9 @@ def _samples(simulated: Simulated, robot: Robot) -> Iterator[Sample]:
         content = {"grey.png" if robot == "mav" else "colour.png": images[index].read_bytes()}
         if robot == "ground":
             content["depth.png"] = files.ground_depth_files[index].read_bytes()
-            facts["depth_units_per_m"] = truth.calibration.ground.depth.units_per_m
+            depth = truth.calibration.ground.depth
+            facts["depth_units_per_m"] = depth.units_per_m
+            facts["depth_delay_ns"] = depth.delay_ns
         content["json"] = json.dumps(facts).encode()
         yield Sample(f"{robot}_{stamp_ns:019d}", content)
 

@@ -59,6 +59,7 @@ def test_images_and_poses_come_back(folder: Path, simulated: Simulated) -> None:
                 # Nominal and true scale differ by the preset's calibration error.
                 ratio = depth[seen] / one["depth_units_per_m"] / image.depth[seen]
                 assert np.abs(ratio - 1).max() < 0.005
+                assert one["depth_delay_ns"] == 0
 
 
 def test_a_shard_is_closed_when_it_is_full(
