@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import mujoco
@@ -15,6 +15,7 @@ from sim.appearance.bake_light import LightBaker
 from sim.appearance.cardboard import FaceKind, Make, paint_face
 from sim.appearance.sheet import faded, light_up
 from sim.geometry.box import Box
+from sim.geometry.noise import Image
 
 # What a cube texture shows on each face of a box, in MuJoCo's order: outward normal, and the
 # box axes along which columns and rows grow (OpenGL's convention; a rendered test pins it).
@@ -66,7 +67,7 @@ def paint_boxes(
     """
     if not boxes:
         return []
-    light = _face_light(boxes, baker)
+    light = face_light(boxes, baker)
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
         jobs = [
             pool.submit(_cube_picture, box, makes[box.make], texture, printed, light[i], own)
@@ -86,15 +87,41 @@ def _cube_picture(
     side = _resolution(box.size_m)
     # Drawn apart: the same box is printed or not whatever is painted on it.
     has_print = bool(rng.spawn(1)[0].random() < printed)
-    cube = np.empty((6 * side, side, 3), np.uint8)
-    for index, (normal, columns, rows) in enumerate(CUBE_FACES):
+
+    def paint(size_m: tuple[float, float], kind: FaceKind) -> Image:
+        return paint_face(make, size_m, kind, side, rng, has_print)
+
+    return lit_cube(cube_faces(box.size_m, texture, paint), light, side)
+
+
+def cube_faces(
+    size_m: NDArray[np.float64],
+    texture: float,
+    paint: Callable[[tuple[float, float], FaceKind], Image],
+) -> list[Image]:
+    """Unlit pictures on the faces of a cuboid, turned as a cube texture has them.
+
+    Args:
+        size_m: (3,) edges [m].
+        texture: Contrast of the pictures, 1 as drawn.
+        paint: Painter of a face by its width and height [m] and its kind, upright.
+    """
+    faces = []
+    for normal, columns, rows in CUBE_FACES:
         right, down = _upright(normal)
-        size = tuple(float(np.abs(axis) @ box.size_m) for axis in (right, down))
+        width, height = (float(np.abs(axis) @ size_m) for axis in (right, down))
         kind: FaceKind = "flaps" if normal[2] else "end" if normal[0] else "side"
-        painted = paint_face(make, (size[0], size[1]), kind, side, rng, has_print)
-        pixels = faded(painted, texture)
-        turned = np.ascontiguousarray(np.rot90(pixels, _quarter_turns(right, down, columns, rows)))
-        light_up(turned, light[index], cube[index * side : (index + 1) * side])
+        pixels = faded(paint((width, height), kind), texture)
+        turns = _quarter_turns(right, down, columns, rows)
+        faces.append(np.ascontiguousarray(np.rot90(pixels, turns)))
+    return faces
+
+
+def lit_cube(faces: Sequence[Image], light: NDArray[np.float32], side: int) -> NDArray[np.uint8]:
+    """(6 side, side, 3) cube picture of `faces` in the light (6, n, n, 3) on them."""
+    cube = np.empty((6 * side, side, 3), np.uint8)
+    for index, face in enumerate(faces):
+        light_up(face, light[index], cube[index * side : (index + 1) * side])
     return cube
 
 
@@ -122,7 +149,7 @@ def _quarter_turns(right: NDArray, down: NDArray, columns: tuple, rows: tuple) -
     raise AssertionError("a face's picture is never mirrored")
 
 
-def _face_light(boxes: tuple[Box, ...], baker: LightBaker) -> NDArray[np.float32]:
+def face_light(boxes: Sequence[Box], baker: LightBaker) -> NDArray[np.float32]:
     """(N, 6, n, n, 3) light factors on the faces of every box."""
     n = FACE_LIGHT_CELLS
     cells = (np.arange(n) + 0.5) / n * 2 - 1

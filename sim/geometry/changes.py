@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.geometry.box import Box
-from sim.geometry.settling import ROUNDS, Heap
+from sim.geometry.settling import ROUNDS, Fall, Heap
 from sim.scene import Scene
 
 ChangeKind = Literal["moved", "fallen", "gone"]
@@ -71,7 +71,7 @@ def _from_the_top(
     scene: Scene, boxes: Sequence[Box], count: int, rng: np.random.Generator
 ) -> list[int]:
     """Indices of boxes, each free of boxes above it once those before it are taken away."""
-    heap = Heap(scene, np.array([box.size_m for box in boxes]), rng)
+    heap = _heap(scene, boxes, rng)
     heap.lay([box.T_world_box for box in boxes])
     heights = np.array([box.T_world_box.translation[2] for box in boxes])
     lies_on = heap.touching() & (heights[:, None] > heights)  # the row's box on the column's
@@ -92,7 +92,7 @@ def _resettled(
     rng: np.random.Generator,
 ) -> list[Box | None]:
     """The boxes where they come to rest among fixed ones; None where they are gone."""
-    heap = Heap(scene, np.array([box.size_m for box in before]), rng, fixed)
+    heap = _heap(scene, before, rng, fixed)
     homes = {
         k: box.T_world_box.translation[:2] for k, box in enumerate(before) if kinds[k] == "fallen"
     }
@@ -114,6 +114,15 @@ def _resettled(
         None if heap.parked[k] else replace(box, T_world_box=poses[k])
         for k, box in enumerate(before)
     ]
+
+
+def _heap(
+    scene: Scene, boxes: Sequence[Box], rng: np.random.Generator, fixed: Sequence[Box] = ()
+) -> Heap:
+    """Boxes that fall among fixed ones."""
+    assert scene.rubble is not None
+    sizes = np.array([box.size_m for box in boxes])
+    return Heap(scene, Fall.of(scene.rubble, len(boxes)), sizes, rng, fixed)
 
 
 def _alike(heap: Heap, before: Sequence[Box]) -> NDArray[np.int64]:

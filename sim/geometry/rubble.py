@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from airground.errors import InputError
 from sim.geometry.box import Box
-from sim.geometry.settling import ROUNDS, Heap
+from sim.geometry.settling import Fall, Heap
 from sim.scene import Rubble, Scene
 
 
-def make_heap(scene: Scene, rng: np.random.Generator) -> tuple[Box, ...]:
+def make_heap(scene: Scene, rng: np.random.Generator, fixed: Sequence[Box] = ()) -> tuple[Box, ...]:
     """Drop the boxes of `scene` and return them as they came to rest.
 
     Boxes fall while a wall keeps the ground robot's lane free; then the wall goes, and what
     falls into the lane or lies too high is thrown again. The same generator state gives the
-    same heap.
+    same heap. Boxes lie beside and on the `fixed` things.
 
     Raises:
         InputError: So few boxes fit beside the lane that less than nine tenths remain.
@@ -25,19 +27,8 @@ def make_heap(scene: Scene, rng: np.random.Generator) -> tuple[Box, ...]:
     if rubble is None:
         return ()
     makes, sizes = _draw_boxes(rubble, rng)
-    heap = Heap(scene, sizes, rng)
-    bad = np.arange(len(sizes))
-    for _ in range(1 + ROUNDS):
-        heap.throw(bad, rng)
-        heap.settle(walled=True)
-        heap.settle(walled=False)
-        bad = heap.offenders()
-        if not len(bad):
-            break
-    while len(bad):
-        heap.park(bad)
-        heap.settle(walled=False)
-        bad = heap.offenders()
+    heap = Heap(scene, Fall.of(rubble, len(sizes)), sizes, rng, fixed)
+    heap.drop(rng)
     kept = heap.remaining()
     if len(kept) < 0.9 * rubble.boxes:
         raise InputError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import mujoco
@@ -14,7 +15,7 @@ from airground.core.se3 import SE3
 from sim.geometry.box import Box
 from sim.geometry.lane import distance_to_footprint, lane_points
 from sim.geometry.surface import BOX_CORNERS
-from sim.scene import MAX_HEAP_HEIGHT_M, Scene
+from sim.scene import MAX_HEAP_HEIGHT_M, Rubble, Scene
 
 ROUNDS = 6
 """Boxes that came to lie wrong are thrown again so often."""
@@ -28,11 +29,38 @@ _BOX_FRICTION = [0.6, 0.005, 0.0001]
 _TOUCHING_M = 0.002  # twice what settled boxes sink into each other
 
 
+@dataclass(frozen=True, eq=False)
+class Fall:
+    """How boxes fall.
+
+    Attributes:
+        area_m: Extent along x and y over which they are dropped, centred on the origin [m].
+        piles: Number of places around which they fall; 0 spreads them evenly.
+        clearance_m: Least distance from the ground robot's path [m].
+        top_m: Nothing may lie higher than this [m].
+        tumble: (N,) for each box, 0 drops it upright and aligned with the room, 1 in any
+            orientation.
+    """
+
+    area_m: tuple[float, float]
+    piles: int
+    clearance_m: float
+    top_m: float
+    tumble: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, rubble: Rubble, count: int) -> Fall:
+        """Of so many cardboard boxes."""
+        tumble = np.full(count, rubble.tumble)
+        return cls(rubble.area_m, rubble.piles, rubble.clearance_m, MAX_HEAP_HEIGHT_M, tumble)
+
+
 class Heap:
     """The physics of a heap while it settles.
 
     Args:
-        scene: Scene with a heap.
+        scene: Scene of the heap.
+        fall: How its boxes fall.
         sizes: (N, 3) edges of the boxes that fall [m].
         rng: Source of the places of piles.
         fixed: Boxes that stay where they are.
@@ -41,18 +69,18 @@ class Heap:
     def __init__(
         self,
         scene: Scene,
+        fall: Fall,
         sizes: NDArray,
         rng: np.random.Generator,
         fixed: Sequence[Box] = (),
     ) -> None:
-        assert scene.rubble is not None
-        self.rubble = scene.rubble
+        self.fall = fall
         self.sizes = sizes
         self.lane = lane_points(scene)
         self.half_room = np.array(scene.room.size_m) / 2
         self.fixed_places = np.array([box.T_world_box.translation for box in fixed]).reshape(-1, 3)
         self.fixed_radii = _radii(np.array([box.size_m for box in fixed]).reshape(-1, 3))
-        self.model = _settling_model(scene, sizes, fixed)
+        self.model = _settling_model(scene, fall.clearance_m, sizes, fixed)
         self.data = mujoco.MjData(self.model)
         self.walls = np.flatnonzero(self.model.geom_bodyid == 0)[1 + len(fixed) :]
         self.parked = np.zeros(len(sizes), bool)
@@ -118,7 +146,7 @@ class Heap:
             rise = np.sqrt(np.maximum(reach**2 - gap**2, 0))
             top = np.where(gap < reach, others[:, 2] + rise, 0).max(1, initial=0.0)
             best = int(np.argmin(top))
-            tumble = self.rubble.tumble if home is None else 1.0
+            tumble = self.fall.tumble[box] if home is None else 1.0
             turn = Rotation.from_rotvec(tumble * _in_ball(rng) * np.pi)
             height = max(top[best] + 0.02, 1.1 * radii[box])
             x, y = candidates[best]
@@ -130,7 +158,7 @@ class Heap:
         self, radius: float, rng: np.random.Generator, home: NDArray | None
     ) -> NDArray:
         """(K, 2) places in the area or near a home, off the lane."""
-        half = np.array(self.rubble.area_m) / 2
+        half = np.array(self.fall.area_m) / 2
         places, choice = rng.uniform(-half, half, (40, 2)), 6
         if home is not None:
             places, choice = home + rng.normal(0, _HOME_SPREAD_M, (40, 2)), 2
@@ -139,7 +167,7 @@ class Heap:
             places = np.clip(chosen + rng.normal(0, _PILE_SPREAD_M, (40, 2)), -half, half)
             choice = 2  # fewer to choose the lowest from: they pile up
         away = self._from_lane(places)
-        free = places[away > self.rubble.clearance_m + 0.7 * radius][:choice]
+        free = places[away > self.fall.clearance_m + 0.7 * radius][:choice]
         return free if len(free) else places[[np.argmax(away)]]
 
     def _from_lane(self, places: NDArray) -> NDArray:
@@ -148,13 +176,29 @@ class Heap:
 
     def _draw_piles(self, rng: np.random.Generator) -> NDArray:
         """(piles, 2) places off the lane, as far apart as many tries bring them."""
-        half = np.array(self.rubble.area_m) / 2 - _PILE_SPREAD_M
+        half = np.array(self.fall.area_m) / 2 - _PILE_SPREAD_M
         piles = np.empty((0, 2))
-        for _ in range(self.rubble.piles):
+        for _ in range(self.fall.piles):
             places = rng.uniform(-half, half, (200, 2))
             apart = np.linalg.norm(places[:, None] - piles[None], axis=2).min(1, initial=1.5)
             piles = np.append(piles, places[[np.argmax(apart + self._from_lane(places))]], axis=0)
         return piles
+
+    def drop(self, rng: np.random.Generator) -> None:
+        """Let all boxes fall and settle. What then lies wrong is thrown again, `ROUNDS` times, and
+        put away after that."""
+        bad = np.arange(len(self.sizes))
+        for _ in range(1 + ROUNDS):
+            self.throw(bad, rng)
+            self.settle(walled=True)
+            self.settle(walled=False)
+            bad = self.offenders()
+            if not len(bad):
+                break
+        while len(bad):
+            self.park(bad)
+            self.settle(walled=False)
+            bad = self.offenders()
 
     def settle(self, walled: bool) -> None:
         """Step until nothing moves, or for a few seconds."""
@@ -178,9 +222,9 @@ class Heap:
                 continue
             corners = pose @ (BOX_CORNERS * self.sizes[i] / 2)
             outside = (np.abs(corners[:, :2]) > self.half_room - 0.05).any()
-            too_high = corners[:, 2].max() > MAX_HEAP_HEIGHT_M - 0.02
+            too_high = corners[:, 2].max() > self.fall.top_m - 0.02
             sunk = corners[:, 2].min() < -0.01
-            near = distance_to_footprint(self.lane, corners) < self.rubble.clearance_m
+            near = distance_to_footprint(self.lane, corners) < self.fall.clearance_m
             if outside or too_high or near or sunk:
                 bad.append(i)
         return np.array(bad, int)
@@ -197,9 +241,10 @@ def _radii(sizes: NDArray) -> NDArray[np.float64]:
     return np.asarray(0.42 * np.linalg.norm(sizes, axis=1))
 
 
-def _settling_model(scene: Scene, sizes: NDArray, fixed: Sequence[Box]) -> mujoco.MjModel:
+def _settling_model(
+    scene: Scene, clearance_m: float, sizes: NDArray, fixed: Sequence[Box]
+) -> mujoco.MjModel:
     """Floor first, fixed boxes, the walls around the lane, then one free body a box."""
-    assert scene.rubble is not None
     spec = mujoco.MjSpec()
     spec.option.timestep = 0.004
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -215,7 +260,7 @@ def _settling_model(scene: Scene, sizes: NDArray, fixed: Sequence[Box]) -> mujoc
             friction=_BOX_FRICTION,
         )
     slippery = {"friction": [0.01, 0, 0], "priority": 1}
-    keep = scene.rubble.clearance_m + _MARGIN_M
+    keep = clearance_m + _MARGIN_M
     corners = np.array(scene.ground.waypoints)[:, :2]
     for x, y in corners:
         spec.worldbody.add_geom(

@@ -11,18 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from airground.core.arrays import read_only
 from sim.appearance.bake_light import LightBaker
-from sim.appearance.cardboard import Make
-from sim.appearance.pictures import add_picture, paint_boxes
-from sim.appearance.print_marks import BRANDS
 from sim.geometry.box import Box
 from sim.geometry.changes import Change, boxes_after, change_heap
 from sim.geometry.ground_cover import grow_cover
 from sim.geometry.parts import Part
 from sim.geometry.rocks import scatter_rocks
-from sim.geometry.rubble import make_heap
 from sim.geometry.surface import BOX_TRIANGLES, Mesh, box_mesh, join
 from sim.geometry.terrain import HeightField, make_terrain
 from sim.scene import Light, Scene, Terrain
+from sim.world.indoor import add_box_pictures, add_boxes, make_things
 from sim.world.outdoor import add_cover, add_ground, add_rocks
 from sim.world.room import add_room, room_mesh, room_parts
 
@@ -43,7 +40,7 @@ class World:
         vertices: (V, 3) float64, the true surface in `world` [m].
         triangles: (T, 3) int64 vertex indices, counter-clockwise seen from outside.
         parts: What the triangles belong to, in their order.
-        boxes: The settled boxes, if any.
+        boxes: Cuboids on a floor, if any: settled boxes, and what is built.
         terrain: The height field of natural ground; None is a floor at z = 0.
         changes: What has happened to boxes since the ground robot saw them, if anything.
     """
@@ -89,7 +86,7 @@ def build_world(scene: Scene, seed: int, pictures: bool = True) -> World:
     if scene.terrain:
         rngs = geometry_rng, picture_rng
         return _build_outdoor(scene, seed, scene.terrain, scene.light, *rngs, pictures)
-    boxes = make_heap(scene, geometry_rng)
+    boxes = make_things(scene, geometry_rng)
     return _build_indoor(scene, seed, boxes, (), scene.light, picture_rng, pictures)
 
 
@@ -145,9 +142,9 @@ def _build_indoor(
     baker = _baker(light, floor, box_meshes, _CONCRETE, _CARDBOARD) if pictures else None
     add_room(spec, scene.room, scene.texture, baker, picture_rng)
     if baker:
-        _add_box_pictures(spec, scene, heap, boxes, baker, picture_rng)
-    _add_boxes(spec, boxes, pictures)
-    box_parts = [Part(box.name, "box", len(BOX_TRIANGLES)) for box in boxes]
+        add_box_pictures(spec, scene, heap, boxes, baker, picture_rng)
+    add_boxes(spec, boxes, pictures)
+    box_parts = [Part(box.name, box.kind, len(BOX_TRIANGLES)) for box in boxes]
     parts = (*room_parts(scene.room), *box_parts)
     return World(scene, seed, spec, *surface, parts, boxes, changes=changes)
 
@@ -206,36 +203,3 @@ def _empty_spec(lit: bool) -> mujoco.MjSpec:
     spec.stat.extent = 5.0
     spec.stat.center = [0, 0, 0.5]
     return spec
-
-
-def _add_box_pictures(
-    spec: mujoco.MjSpec,
-    scene: Scene,
-    heap: tuple[Box, ...],
-    boxes: tuple[Box, ...],
-    baker: LightBaker,
-    rng: np.random.Generator,
-) -> None:
-    """Give every one of `boxes` six pictures of its own, the same wherever a box of `heap` is."""
-    if not scene.rubble:
-        return
-    names = rng.permutation(BRANDS)
-    makes = [Make.draw(rng, str(names[k % len(names)])) for k in range(scene.rubble.makes)]
-    own = dict(zip((box.name for box in heap), rng.spawn(len(heap)), strict=True))
-    rngs = [own[box.name] for box in boxes]
-    pictures = paint_boxes(boxes, makes, scene.texture, scene.rubble.printed, baker, rngs)
-    for box, picture in zip(boxes, pictures, strict=True):
-        add_picture(spec, box.name, picture, cube=True)
-
-
-def _add_boxes(spec: mujoco.MjSpec, boxes: tuple[Box, ...], pictures: bool) -> None:
-    """Add every box as a geom of its name."""
-    for box in boxes:
-        spec.worldbody.add_geom(
-            name=box.name,
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            size=box.size_m / 2,
-            pos=box.T_world_box.translation,
-            quat=np.roll(box.T_world_box.quaternion_xyzw(), 1),
-            **({"material": box.name} if pictures else {"rgba": [0.72, 0.55, 0.36, 1]}),
-        )

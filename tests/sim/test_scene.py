@@ -9,7 +9,9 @@ from sim.scene import load_scene, parse_scene, scene_names
 from sim.world.world import build_world
 
 PAPER = ["paper_a", "paper_b", "paper_c", "paper_outdoor"]
-SHIPPED = ["flat", "indoor_a", "indoor_b", "indoor_c", "outdoor", *PAPER, "tiny"]
+SHIPPED = [
+    "collapsed", "flat", "indoor_a", "indoor_b", "indoor_c", "outdoor", *PAPER, "tiny", "warehouse",
+]  # fmt: skip
 
 SMALL = """
 name = "small"
@@ -45,7 +47,7 @@ def test_a_scene_is_also_read_from_a_path(tmp_path) -> None:
 
 
 def test_an_unknown_scene_lists_the_known_ones() -> None:
-    with pytest.raises(InputError, match=r"unknown scene 'nowhere': known are flat, indoor_a"):
+    with pytest.raises(InputError, match=r"unknown scene 'nowhere': known are collapsed, flat"):
         load_scene("nowhere")
 
 
