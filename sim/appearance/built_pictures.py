@@ -21,7 +21,7 @@ from sim.geometry.box import Box
 from sim.geometry.noise import Image
 from sim.geometry.parts import Kind
 
-REPEATED: tuple[Kind, ...] = ("box", "post", "board", "pavement")
+REPEATED: tuple[Kind, ...] = ("box", "post", "board")
 """Things of these kinds and of one size have one picture; only light differs."""
 PX_PER_M = 400.0
 """Finest picture of what is built: a camera at 1 m sees 420 to 525 pixels a metre."""
@@ -35,7 +35,6 @@ _PAINTERS: dict[Kind, _Painter] = {
     "column": paint_concrete_face,
     "slab": paint_concrete_face,
     "beam": paint_concrete_face,
-    "pavement": paint_concrete_face,
     "brick": paint_brickwork,
 }
 
