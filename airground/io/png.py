@@ -119,7 +119,7 @@ def undo_filters(filtered: U8, rows: U8, pixel_bytes: int) -> bool:
 
 @njit(cache=True, nogil=True)
 def _add_left(line: U8, row: U8, pixel_bytes: int) -> None:
-    """Filter 1, which our recordings use throughout: sums of as many channels side by side."""
+    """Filter 1, which our colour images use: sums of as many channels side by side."""
     if pixel_bytes == 3:
         red = green = blue = 0
         for x in range(0, len(row), 3):
@@ -139,7 +139,7 @@ def _add_left(line: U8, row: U8, pixel_bytes: int) -> None:
 
 @njit(cache=True, nogil=True)
 def _add_above(line: U8, above: U8, row: U8) -> None:
-    """Filter 2."""
+    """Filter 2, which our grey and depth images use."""
     for x in range(len(row)):
         row[x] = (line[x] + above[x]) & 255
 

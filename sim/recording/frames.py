@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from airground.io import layout
 from airground.io.calibration import CalibrationTable, RobotTable
 from airground.io.digests import bytes_digest
 from airground.io.lens import Lens
+from airground.io.png_encoder import encode_png
 from airground.io.recording_writer import ground_image_name, mav_image_name
 from sim.geometry.edges import Edges
 from sim.recording.carried_lamp import CarriedLamp
@@ -25,15 +25,6 @@ from sim.sensors.depth import kinect_depth
 from sim.sensors.pixel_rays import PixelRays
 from sim.sensors.presets import SensorPreset
 
-# Noise does not compress: the fastest settings, half the time of the default ones.
-PNG_SETTINGS = [
-    cv2.IMWRITE_PNG_COMPRESSION,
-    1,
-    cv2.IMWRITE_PNG_STRATEGY,
-    cv2.IMWRITE_PNG_STRATEGY_HUFFMAN_ONLY,
-    cv2.IMWRITE_PNG_FILTER,
-    cv2.IMWRITE_PNG_FILTER_SUB,
-]
 _PNG_MAX = 65535
 
 
@@ -125,7 +116,7 @@ class FrameMaker:
         colour, depth_units = self.ground(index)
         name = ground_image_name(stamp)
         return [
-            self._write(layout.GROUND_COLOUR, name, cv2.cvtColor(colour, cv2.COLOR_RGB2BGR)),
+            self._write(layout.GROUND_COLOUR, name, colour),
             self._write(layout.GROUND_DEPTH, name, depth_units),
         ]
 
@@ -181,8 +172,7 @@ class FrameMaker:
         return np.where(fits, np.rint(units), 0).astype(np.uint16)
 
     def _write(self, folder: str, name: str, image: NDArray) -> Written:
-        _, encoded = cv2.imencode(".png", image, PNG_SETTINGS)
-        data = encoded.tobytes()
+        data = encode_png(image)
         (self._plan.recording / folder / name).write_bytes(data)
         return Written(folder, name, bytes_digest(data))
 
