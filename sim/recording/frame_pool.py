@@ -62,7 +62,7 @@ class FrameServer:
     """
 
     def __init__(self, plan: FramePlan, workers: int) -> None:
-        self._counts = {robot: len(stamps) for robot, stamps in plan.stamps_ns.items()}
+        self._counts = {robot: len(frames.stamps_ns) for robot, frames in plan.frames.items()}
         self._workers = workers
         self._pool = _pool(plan, workers)
         self._ahead: dict[Robot, dict[int, Future[Any]]] = {robot: {} for robot in ROBOTS}
@@ -120,7 +120,7 @@ def _tasks(plan: FramePlan) -> list[Task]:
     """Runs of frames of both robots, taken in turn."""
     tasks: list[Task] = []
     for robot in ROBOTS:
-        count = len(plan.stamps_ns[robot])
+        count = len(plan.frames[robot].stamps_ns)
         for first in range(0, count, FRAMES_PER_TASK):
             tasks.append((robot, first, min(first + FRAMES_PER_TASK, count)))
     return sorted(tasks, key=lambda task: task[1])

@@ -22,6 +22,7 @@ from sim.recording.robot_view import RobotView
 from sim.robots.motion import ROBOTS, Motion, Robot
 from sim.sensors.camera import ImageSensor
 from sim.sensors.depth import kinect_depth
+from sim.sensors.faulty_frames import FaultyFrames
 from sim.sensors.pixel_rays import PixelRays
 from sim.sensors.presets import SensorPreset
 
@@ -47,7 +48,8 @@ class FramePlan:
         unlit: What the ground robot sees, without light, for the lamp that it carries.
         lamp: The lamp; None without one.
         true: True calibration of the sensors.
-        stamps_ns: Nominal stamps of each robot's images [ns].
+        taken_ns: Nominal stamps at which each robot's camera takes an image [ns].
+        frames: The frames that are left of them by faults of the sensors.
     """
 
     recording: Path
@@ -56,7 +58,8 @@ class FramePlan:
     true: CalibrationTable
     preset: SensorPreset
     seeds: tuple[int, int]
-    stamps_ns: dict[Robot, NDArray[np.int64]]
+    taken_ns: dict[Robot, NDArray[np.int64]]
+    frames: dict[Robot, FaultyFrames]
     unlit: WorldFiles | None = None
     lamp: CarriedLamp | None = None
 
@@ -110,7 +113,7 @@ class FrameMaker:
 
     def make(self, robot: Robot, index: int) -> list[Written]:
         """Write the files of one frame."""
-        stamp = int(self._plan.stamps_ns[robot][index])
+        stamp = int(self._plan.frames[robot].stamps_ns[index])
         if robot == "mav":
             return [self._write(layout.MAV_IMAGES, mav_image_name(stamp), self.mav(index))]
         colour, depth_units = self.ground(index)
@@ -126,7 +129,7 @@ class FrameMaker:
         grey, depth = self._views["mav"].draw(time_ns)
         if "mav" in self._sensors:
             grey = self._expose("mav", grey, depth, time_ns, rng)
-        return np.asarray(grey[..., 0], np.uint8)
+        return self._plan.frames["mav"].image(index, np.asarray(grey[..., 0], np.uint8))
 
     def ground(self, index: int) -> tuple[NDArray[np.uint8], NDArray[np.uint16]]:
         """(height, width, 3) RGB and (height, width) depth as PNG values, of the ground robot."""
@@ -142,14 +145,17 @@ class FrameMaker:
             _, depth = self._views["ground"].draw(time_ns + delay_ns)
         if self._plan.preset.depth is not None:
             depth = kinect_depth(depth, self._pixels["ground"], self._plan.preset.depth, rng)
-        return colour, self._depth_units(depth)
+        frames = self._plan.frames["ground"]
+        units = frames.depth_units(index, self._depth_units(depth))
+        return frames.image(index, colour), units
 
     def _start(self, robot: Robot, index: int) -> tuple[int, np.random.Generator]:
         """When a frame is really taken [ns], and what its noise is drawn from."""
-        stamp = int(self._plan.stamps_ns[robot][index])
+        taken = int(self._plan.frames[robot].taken[index])
+        stamp = int(self._plan.taken_ns[robot][taken])
         # Noise depends on the frame alone, not on who makes it. Counted from 1, for numpy
         # takes [a] and [a, 0] as the same seed.
-        rng = np.random.default_rng([*self._plan.seeds, ROBOTS.index(robot) + 1, index + 1])
+        rng = np.random.default_rng([*self._plan.seeds, ROBOTS.index(robot) + 1, taken + 1])
         return stamp + self._table(robot).camera.time_offset_ns, rng
 
     def _view(self, robot: Robot, renderer: Renderer, edges: Edges) -> RobotView:

@@ -7,9 +7,9 @@ import os
 import shutil
 import tempfile
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import mujoco
@@ -31,9 +31,12 @@ from sim.recording.frames import FramePlan, WorldFiles
 from sim.recording.render import with_cameras
 from sim.recording.truth import write_truth
 from sim.recording.view_tiles import tiles_of
-from sim.robots.motion import RATE_HZ, Motion, Robot, simulate_motion
+from sim.robots.carried import carried_back
+from sim.robots.motion import RATE_HZ, STEP_NS, Motion, Robot, simulate_motion
 from sim.robots.robot_motion import RobotMotion
 from sim.scene import Scene
+from sim.sensors.faults import Fault, faulty_field, faulty_imu, of_robot, placed
+from sim.sensors.faulty_frames import FaultyFrames
 from sim.sensors.imu import measure_field, measure_imu
 from sim.sensors.miscalibration import CAMERA_RATE_HZ, MAGNETOMETER_RATE_HZ, calibrate
 from sim.sensors.presets import SensorPreset
@@ -42,6 +45,8 @@ from sim.world.world import World, build_world, flight_world, unlit_world
 # The cameras share no trigger; no exposure may reach beyond the motion.
 FIRST_IMAGE_NS: dict[Robot, int] = {"mav": 50_000_000, "ground": 55_000_000}
 _MARGIN_NS = 20_000_000
+_OF_FAULTS = 3
+"""Number of the generator of faults; 1 and 2 are those of the cameras."""
 
 Progress = Callable[[int, int], None]
 """Consumer of progress: frames rendered, frames in all."""
@@ -159,20 +164,25 @@ def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan]
     world = build_world(scene, flight.seed, pictures=False)
     flown = flight_world(world, pictures=False)
     motion = simulate_motion(world, scene, int(motion_rng.integers(2**63)), flight.duration_s)
+    faults = placed(preset.faults, motion.duration_s, np.random.default_rng([*seeds, _OF_FAULTS]))
+    motion = _carried(motion, faults)
     sensors = calibrate(
         scene.mav.camera_f_px, motion.mav.mounting, motion.ground.mounting, preset, calibration_rng
     )
-    stamps = {
+    taken = {
         robot: _within(motion, image_stamps(motion.stamps_ns, first), preset)
         for robot, first in FIRST_IMAGE_NS.items()
     }
+    frames = {r: FaultyFrames.of(taken[r], of_robot(faults, r)) for r in taken}
     recording_writer.make_folders(root)
-    write_truth(root, world, flown, motion, sensors.true)
+    write_truth(root, world, flown, motion, sensors.true, faults)
     nominal = sensors.nominal
-    mav_samples = _samples(motion.stamps_ns, motion.mav, preset, mav_rng)
-    ground_samples = _samples(motion.stamps_ns, motion.ground, preset, ground_rng)
-    recording_writer.write_mav(root, nominal.mav, stamps["mav"], *mav_samples)
-    recording_writer.write_ground(root, nominal.ground, stamps["ground"], *ground_samples)
+    own = of_robot(faults, "mav")
+    mav_samples = _samples(motion.stamps_ns, motion.mav, preset, own, mav_rng)
+    own = of_robot(faults, "ground")
+    ground_samples = _samples(motion.stamps_ns, motion.ground, preset, own, ground_rng)
+    recording_writer.write_mav(root, nominal.mav, frames["mav"].stamps_ns, *mav_samples)
+    recording_writer.write_ground(root, nominal.ground, frames["ground"].stamps_ns, *ground_samples)
     plan = FramePlan(
         recording=root,
         worlds=_world_files(root, one=flown is world),
@@ -180,7 +190,8 @@ def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan]
         true=sensors.true,
         preset=preset,
         seeds=seeds,
-        stamps_ns=stamps,
+        taken_ns=taken,
+        frames=frames,
         unlit=_unlit_files(root) if scene.ground.lamp > 0 else None,
         lamp=CarriedLamp(scene.ground.lamp, scene.ground.lamp_beam_deg),
     )
@@ -190,7 +201,7 @@ def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan]
         flight=flight.flight,
         sensors=preset.name,
         duration_s=motion.duration_s,
-        frames=FrameCounts(mav=len(stamps["mav"]), ground=len(stamps["ground"])),
+        frames=FrameCounts(**{robot: len(left.stamps_ns) for robot, left in frames.items()}),
         calibration=nominal,
         digests={},
     )
@@ -253,21 +264,37 @@ def _within(
     return stamps_ns[stamps_ns + reach_ns <= motion.stamps_ns[-1]]
 
 
+def _carried(motion: Motion, faults: Sequence[Fault]) -> Motion:
+    """The motion with the ground robot carried back where a fault says so."""
+    for fault in faults:
+        if fault.kind == "carried":
+            start, end = fault.start_ns // STEP_NS, fault.end_ns // STEP_NS
+            back, step_s = round(fault.strength * RATE_HZ), STEP_NS * 1e-9
+            ground = carried_back(motion.ground, start, end, back, step_s)
+            motion = replace(motion, ground=ground)
+    return motion
+
+
 def _samples(
-    stamps_ns: NDArray[np.int64], robot: RobotMotion, preset: SensorPreset, rng: np.random.Generator
+    stamps_ns: NDArray[np.int64],
+    robot: RobotMotion,
+    preset: SensorPreset,
+    faults: Sequence[Fault],
+    rng: np.random.Generator,
 ) -> tuple[ImuSamples, MagneticSamples]:
     ideal = ImuSamples(stamps_ns, robot.gyro_imu, robot.specific_force_imu)
     every = slice(None, None, round(RATE_HZ / MAGNETOMETER_RATE_HZ))
     field = measure_field(
         stamps_ns[every], robot.field_imu[every], robot.anomaly_imu[every], preset.magnetic, rng
     )
-    return measure_imu(ideal, preset.imu, rng), field
+    imu = measure_imu(ideal, preset.imu, rng)
+    return faulty_imu(imu, faults), faulty_field(field, faults)
 
 
 def _render(plan: FramePlan, workers: int, progress: Progress | None) -> dict[str, dict[str, str]]:
     """Make all frames; returns the digests of the images by folder and name."""
     digests: dict[str, dict[str, str]] = defaultdict(dict)
-    done, total = 0, sum(len(stamps) for stamps in plan.stamps_ns.values())
+    done, total = 0, sum(len(frames.stamps_ns) for frames in plan.frames.values())
     for files in make_frames(plan, workers):
         for file in files:
             digests[file.folder][file.name] = file.digest

@@ -5,6 +5,7 @@
 `calibration.toml` (the real one, in the schema of the nominal one) and `motion.npz` (the exact
 states). If boxes change before the MAV flies, these files hold what the ground robot sees;
 `surface_mav.ply` and `parts_mav.csv` hold what the MAV sees, and `changes.csv` what has changed.
+If sensors fail, `faults.csv` lists which, from when to when.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from sim.geometry.changes import Change
 from sim.recording.row_poses import RowPoses, exact_row_poses
 from sim.recording.true_surface import TrueSurface
 from sim.robots.motion import ROBOTS, Motion, Robot
+from sim.sensors.faults import Fault
 from sim.world.world import World
 
 _CHANGES = "changes.csv"
@@ -103,7 +105,12 @@ class Truth:
 
 
 def write_truth(
-    recording: Path, drive: World, flight: World, motion: Motion, calibration: CalibrationTable
+    recording: Path,
+    drive: World,
+    flight: World,
+    motion: Motion,
+    calibration: CalibrationTable,
+    faults: Sequence[Fault] = (),
 ) -> None:
     """Write `truth/` into a recording's folder.
 
@@ -112,6 +119,7 @@ def write_truth(
         drive, flight: Worlds that the ground robot and the MAV see.
         motion: Motion of both robots.
         calibration: True calibration of the sensors.
+        faults: Failures of sensors, with their starts.
     """
     folder = recording / TRUTH
     folder.mkdir()
@@ -126,6 +134,8 @@ def write_truth(
     if flight.changes:
         _mav_surface(folder).write(flight)
         _write_changes(folder / _CHANGES, flight.changes)
+    if faults:
+        _write_faults(folder / "faults.csv", faults)
 
 
 def _ground_surface(truth: Path) -> TrueSurface:
@@ -158,6 +168,18 @@ def _write_changes(path: Path, changes: Sequence[Change]) -> None:
         for change in changes
     ]
     _write_table(path, ["name", "change", *columns], rows)
+
+
+def _write_faults(path: Path, faults: Sequence[Fault]) -> None:
+    rows = [
+        [
+            fault.kind,
+            fault.robot,
+            *_numbers((fault.start_ns * 1e-9, fault.end_ns * 1e-9, fault.strength)),
+        ]
+        for fault in faults
+    ]
+    _write_table(path, ["kind", "robot", "start [s]", "end [s]", "size"], rows)
 
 
 def _write_table(path: Path, columns: list[str], rows: list[list[str]]) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from airground.errors import InputError
 from airground.io.lens import KINECT_READOUT_S
+from sim.sensors.faults import Fault
 from sim.sensors.optics import PINHOLE, Optics
 from sim.world.magnetic_field import EARTH_FIELD_WORLD
 
@@ -120,6 +121,7 @@ class SensorPreset:
     Attributes:
         mav_optics, ground_optics: Lens and shutter of the MAV's and the ground robot's camera.
         depth_delay_ns: Time from a colour image to the depth image with its stamp [ns].
+        faults: Failures of single sensors, for a while.
     """
 
     name: str
@@ -131,6 +133,7 @@ class SensorPreset:
     mav_optics: Optics = PINHOLE
     ground_optics: Optics = PINHOLE
     depth_delay_ns: int = 0
+    faults: tuple[Fault, ...] = ()
 
 
 # ADIS16448 as in EuRoC's sensor.yaml; the biases are those of a few minutes after turn-on.
@@ -252,6 +255,27 @@ def with_distortion(preset: SensorPreset, factor: float) -> SensorPreset:
         mav_optics=replace(preset.mav_optics, lens="radtan", distortion=factor),
         ground_optics=replace(preset.ground_optics, lens="radtan", distortion=factor),
     )
+
+
+def with_dropped(preset: SensorPreset, seconds: float) -> SensorPreset:
+    """The preset with cameras that both drop their images for so long [s], each at a time drawn by
+    the seed."""
+    return _with_faults(
+        preset, Fault("dropped", "mav", seconds), Fault("dropped", "ground", seconds)
+    )
+
+
+def with_imu_gap(preset: SensorPreset, seconds: float) -> SensorPreset:
+    """The preset with IMUs that both miss their samples for so long [s], each at a time drawn by
+    the seed."""
+    return _with_faults(
+        preset, Fault("imu_gap", "mav", seconds), Fault("imu_gap", "ground", seconds)
+    )
+
+
+def _with_faults(preset: SensorPreset, *faults: Fault) -> SensorPreset:
+    lasting = tuple(fault for fault in faults if fault.duration_s > 0)
+    return replace(preset, faults=(*preset.faults, *lasting))
 
 
 def with_heading_error(preset: SensorPreset, deviation_deg: float) -> SensorPreset:

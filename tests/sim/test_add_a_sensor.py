@@ -20,7 +20,8 @@ from sim.sensors.presets import NONE
 from tests.sim.small_flight import SCENE, few_stamps, plain_world
 
 PAGE = Path(__file__).parents[2] / "docs" / "add_a_sensor.md"
-PRESET, RANGEFINDER = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.S)
+EXAMPLES = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.S)
+PRESET, FAILING, RANGEFINDER = EXAMPLES
 
 
 @pytest.fixture(autouse=True)
@@ -42,9 +43,11 @@ def test_a_recording_is_made_with_the_preset(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    names_after(PRESET, tmp_path)
+    names_after(PRESET + FAILING, tmp_path)
     recording, truth = Recording.open("recordings/home"), Truth.open("recordings/home")
     recording.verify()
+    faults = Path("recordings/failing/truth/faults.csv").read_text().splitlines()
+    assert [row.split(",")[0] for row in faults] == ["kind", "black", "imu_gap"]
     assert recording.sensors == "home"
     nominal, true = recording.mav.calibration.camera, truth.lens("mav").pinhole()
     assert abs(nominal.fx / true.fx - 1) == pytest.approx(2e-3)

@@ -15,7 +15,9 @@ from sim.scene import MAX_HEAP_HEIGHT_M, Light, Scene
 from sim.sensors.presets import (
     SensorPreset,
     with_distortion,
+    with_dropped,
     with_heading_error,
+    with_imu_gap,
     with_noise,
     with_readout,
 )
@@ -140,6 +142,16 @@ DIALS = (
         "sensors.distortion", "", 0.0, 1.5,
         "factor of the measured radial-tangential distortion of both cameras' lenses",
         lambda subject, value: replace(subject, sensors=with_distortion(subject.sensors, value)),
+    ),
+    Dial(
+        "sensors.dropped_s", "s", 0.0, 5.0,
+        "time for which each robot's camera drops its images, once, at a time drawn by the seed",
+        lambda subject, value: replace(subject, sensors=with_dropped(subject.sensors, value)),
+    ),
+    Dial(
+        "sensors.imu_gap_s", "s", 0.0, 5.0,
+        "time for which each robot's IMU misses its samples, once, at a time drawn by the seed",
+        lambda subject, value: replace(subject, sensors=with_imu_gap(subject.sensors, value)),
     ),
     Dial(
         "sensors.heading_error_deg", "deg", 0.0, 45.0,

@@ -114,6 +114,8 @@ def test_dials_turn_what_they_name() -> None:
         "sensors.noise": 2.0,
         "sensors.readout_ms": 20.0,
         "sensors.distortion": 0.5,
+        "sensors.dropped_s": 2.0,
+        "sensors.imu_gap_s": 0.5,
         "sensors.heading_error_deg": 5.0,
         "height_maps.cells_per_m": 50.0,
     }
@@ -133,6 +135,8 @@ def test_dials_turn_what_they_name() -> None:
     assert subject.sensors.image is not None
     assert subject.sensors.magnetic is not None
     assert subject.sensors.image.read_noise == 2 * NOMINAL.image.read_noise  # type: ignore[union-attr]
+    faults = [(fault.kind, fault.duration_s) for fault in subject.sensors.faults]
+    assert faults == 2 * [("dropped", 2.0)] + 2 * [("imu_gap", 0.5)]
     # What is turned is still a valid scene.
     assert type(scene).model_validate(scene.model_dump()) == scene
 
