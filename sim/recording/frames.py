@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import mujoco
@@ -17,9 +18,11 @@ from airground.io.png_encoder import encode_png
 from airground.io.recording_writer import ground_image_name, mav_image_name
 from sim.geometry.edges import Edges
 from sim.recording.carried_lamp import CarriedLamp
+from sim.recording.drone_shadow import DroneShadow
 from sim.recording.render import Renderer
 from sim.recording.robot_view import RobotView
 from sim.robots.motion import ROBOTS, Motion, Robot
+from sim.robots.moving_bodies import read_bodies
 from sim.sensors.camera import ImageSensor
 from sim.sensors.depth import kinect_depth
 from sim.sensors.faulty_frames import FaultyFrames
@@ -44,9 +47,10 @@ class FramePlan:
     Attributes:
         recording: Folder that images are written into.
         worlds: What each robot sees.
-        motion: File of the motion.
+        motion: File of the motion, beside those of bodies that move.
         unlit: What the ground robot sees, without light, for the lamp that it carries.
         lamp: The lamp; None without one.
+        shadows: The MAV's shadow in the light that each robot sees; none if it throws none.
         true: True calibration of the sensors.
         taken_ns: Nominal stamps at which each robot's camera takes an image [ns].
         frames: The frames that are left of them by faults of the sensors.
@@ -62,6 +66,7 @@ class FramePlan:
     frames: dict[Robot, FaultyFrames]
     unlit: WorldFiles | None = None
     lamp: CarriedLamp | None = None
+    shadows: Mapping[Robot, DroneShadow] = field(default_factory=dict)
 
     def world_files(self) -> set[WorldFiles]:
         """Files of all worlds."""
@@ -84,19 +89,20 @@ class FrameMaker:
     def __init__(self, plan: FramePlan) -> None:
         self._plan = plan
         self._motion = Motion.load(plan.motion)
+        self._bodies = read_bodies(plan.motion.parent)
         # One world that both robots see is loaded once.
         edges = {files: Edges.load(files.edges) for files in plan.worlds.values()}
         renderers = {files: _renderer(files) for files in edges}
         self._renderers = list(renderers.values())
         self._views = {
-            robot: self._view(robot, renderers[files], edges[files])
+            robot: self._view(robot, renderers[files], edges[files], plan.shadows.get(robot))
             for robot, files in plan.worlds.items()
         }
         self._unlit: RobotView | None = None
         if plan.unlit is not None:
             self._renderers.append(_renderer(plan.unlit))
             of_drive = edges[plan.worlds["ground"]]
-            self._unlit = self._view("ground", self._renderers[-1], of_drive)
+            self._unlit = self._view("ground", self._renderers[-1], of_drive, None)
         self._pixels = {robot: PixelRays.of(self._lens(robot)) for robot in ROBOTS}
         self._sensors: dict[Robot, ImageSensor] = {}
         if plan.preset.image is not None:
@@ -158,9 +164,12 @@ class FrameMaker:
         rng = np.random.default_rng([*self._plan.seeds, ROBOTS.index(robot) + 1, taken + 1])
         return stamp + self._table(robot).camera.time_offset_ns, rng
 
-    def _view(self, robot: Robot, renderer: Renderer, edges: Edges) -> RobotView:
+    def _view(
+        self, robot: Robot, renderer: Renderer, edges: Edges, shadow: DroneShadow | None
+    ) -> RobotView:
         lens, grey = self._lens(robot), robot == "mav"
-        return RobotView(robot, lens, self._motion, renderer, edges, grey)
+        motion, bodies = self._motion, self._bodies
+        return RobotView(robot, lens, motion, renderer, edges, grey, bodies, shadow)
 
     def _expose(
         self, robot: Robot, sharp: NDArray, depth: NDArray, time_ns: int, rng: np.random.Generator

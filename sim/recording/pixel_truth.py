@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from airground.io.lens import Lens
 from sim.geometry.parts import Instances
 from sim.recording.row_poses import RowPoses
-from sim.recording.true_surface import TrueSurface
 from sim.recording.truth import Truth
 from sim.robots.motion import Robot
 
@@ -33,7 +32,9 @@ class PixelTruth:
         lens: True intrinsics, distortion and shutter.
         poses: True pose `T_world_camera` when each row was taken.
         depth: (height, width) float32 along the optical axis [m], NaN where there is nothing.
-        triangle: (height, width) int64 triangle of the robot's surface, -1 where there is nothing.
+        triangle: (height, width) int64 triangle of the robot's surface, -1 where there is nothing;
+            those of bodies that move are counted on from it.
+        time_ns: Time of the motion at which the middle row was taken [ns].
         normals: (height, width, 3) float32 unit normals in the camera's frame, toward the camera;
             NaN where there is nothing.
 
@@ -45,6 +46,7 @@ class PixelTruth:
     depth: NDArray[np.float32]
     triangle: NDArray[np.int64]
     normals: NDArray[np.float32]
+    time_ns: int
 
     def points_world(self) -> NDArray[np.float64]:
         """(height, width, 3) places of the pixels in `world` [m], NaN where there is nothing."""
@@ -57,25 +59,37 @@ def pixel_truth(truth: Truth, robot: Robot, stamp_ns: int) -> PixelTruth:
     """The truth of one image, by its nominal stamp [ns]."""
     lens, poses = truth.lens(robot), truth.row_poses(robot, stamp_ns)
     rays_camera = lens.rays()
-    answer = truth.surface(robot).scene.cast_rays(poses.rays_world(rays_camera))
+    rays, time_ns = poses.rays_world(rays_camera), truth.time_ns(robot, stamp_ns)
+    answer = truth.surface(robot).scene.cast_rays(rays)
     depth = answer["t_hit"].numpy()  # the rays have z = 1 in the camera
+    triangle = answer["primitive_ids"].numpy().astype(np.int64)
+    normals = answer["primitive_normals"].numpy()
+    if truth.bodies.bodies:
+        hits = truth.bodies.hits(robot, rays.numpy(), time_ns)
+        nearer = hits.distance < depth
+        depth = np.where(nearer, hits.distance, depth)
+        count = len(truth.surface(robot).mesh.triangles)
+        triangle = np.where(nearer, count + hits.triangle, triangle)
+        normals = np.where(nearer[..., None], hits.normals, normals)
     hit = np.isfinite(depth)
-    normals = answer["primitive_normals"].numpy() @ poses.rotations
+    normals = normals @ poses.rotations
     away = np.einsum("ijk,ijk->ij", normals, rays_camera) > 0
     normals = np.where(away[..., None], -normals, normals)
     return PixelTruth(
         lens=lens,
         poses=poses,
         depth=np.where(hit, depth, np.nan).astype(np.float32),
-        triangle=np.where(hit, answer["primitive_ids"].numpy().astype(np.int64), -1),
+        triangle=np.where(hit, triangle, -1),
         normals=np.where(hit[..., None], normals, np.nan).astype(np.float32),
+        time_ns=time_ns,
     )
 
 
 def instances_of(truth: Truth, robot: Robot) -> Instances:
     """The things that a robot sees; RecordingError if their list is missing or does not fit the
     surface. A thing has the same id for both robots."""
-    return Instances.of(truth.surface(robot).parts, truth.surface("ground").parts)
+    bodies = truth.bodies.parts
+    return Instances.of([*truth.surface(robot).parts, *bodies], truth.surface("ground").parts)
 
 
 def instance_ids(seen: PixelTruth, instances: Instances) -> NDArray[np.uint16]:
@@ -102,10 +116,13 @@ class Flow:
 def flow(truth: Truth, robot: Robot, seen: PixelTruth, other_stamp_ns: int) -> Flow:
     """Flow from an image to the one with another stamp [ns]."""
     lens, others = seen.lens, truth.row_poses(robot, other_stamp_ns)
-    points = seen.points_world().reshape(-1, 3)
+    points, other_ns = seen.points_world().reshape(-1, 3), truth.time_ns(robot, other_stamp_ns)
+    if truth.bodies.bodies:
+        of_bodies = seen.triangle.ravel() - len(truth.surface(robot).mesh.triangles)
+        points = truth.bodies.carried(points, of_bodies, seen.time_ns, other_ns)
     moved, eyes = _projected(lens, others, points)
     inside = ((moved >= -0.5) & (moved <= np.array([lens.width, lens.height]) - 0.5)).all(1)
-    visible = inside & _unhidden(truth.surface(robot), eyes, points)
+    visible = inside & _unhidden(truth, robot, other_ns, eyes, points)
     columns, rows = np.meshgrid(np.arange(lens.width), np.arange(lens.height))
     shape = (lens.height, lens.width)
     at = np.stack([columns, rows], axis=-1)
@@ -128,11 +145,16 @@ def _projected(lens: Lens, poses: RowPoses, points: NDArray) -> tuple[NDArray, N
     return pixels, eyes
 
 
-def _unhidden(surface: TrueSurface, eyes: NDArray, points: NDArray) -> NDArray[np.bool_]:
+def _unhidden(
+    truth: Truth, robot: Robot, time_ns: int, eyes: NDArray, points: NDArray
+) -> NDArray[np.bool_]:
     """(N,) whether nothing is between each of the eyes (N, 3) and its point (N, 3)."""
     known = np.isfinite(points).all(1)
     clear = np.zeros(len(points), np.bool_)
     rays = np.concatenate([eyes, points - eyes], axis=1)[known].astype(np.float32)
-    hits = surface.scene.cast_rays(o3d.core.Tensor.from_numpy(rays))["t_hit"].numpy()
+    surface = truth.surface(robot).scene
+    hits = surface.cast_rays(o3d.core.Tensor.from_numpy(rays))["t_hit"].numpy()
+    if truth.bodies.bodies:
+        hits = np.minimum(hits, truth.bodies.hits(robot, rays, time_ns).distance)
     clear[known] = hits > 1 - HIDDEN_SHARE
     return clear

@@ -25,14 +25,17 @@ from airground.io.lens import Lens
 from airground.io.recording import Recording
 from sim.geometry.edges import find_edges
 from sim.partial_folder import partial_folder
+from sim.recording.bodies_in_view import add_bodies
 from sim.recording.carried_lamp import CarriedLamp
+from sim.recording.drone_shadow import DroneShadow
 from sim.recording.frame_pool import FrameServer, make_frames
 from sim.recording.frames import FramePlan, WorldFiles
 from sim.recording.render import with_cameras
 from sim.recording.truth import write_truth
 from sim.recording.view_tiles import tiles_of
 from sim.robots.carried import carried_back
-from sim.robots.motion import RATE_HZ, STEP_NS, Motion, Robot, simulate_motion
+from sim.robots.motion import RATE_HZ, ROBOTS, STEP_NS, Motion, Robot, simulate_motion
+from sim.robots.moving_bodies import moving_bodies, read_bodies
 from sim.robots.robot_motion import RobotMotion
 from sim.scene import Scene
 from sim.sensors.faults import Fault, faulty_field, faulty_imu, of_robot, placed
@@ -175,7 +178,8 @@ def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan]
     }
     frames = {r: FaultyFrames.of(taken[r], of_robot(faults, r)) for r in taken}
     recording_writer.make_folders(root)
-    write_truth(root, world, flown, motion, sensors.true, faults)
+    bodies = moving_bodies(scene, world, motion)
+    write_truth(root, world, flown, motion, sensors.true, faults, bodies)
     nominal = sensors.nominal
     own = of_robot(faults, "mav")
     mav_samples = _samples(motion.stamps_ns, motion.mav, preset, own, mav_rng)
@@ -194,6 +198,7 @@ def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan]
         frames=frames,
         unlit=_unlit_files(root) if scene.ground.lamp > 0 else None,
         lamp=CarriedLamp(scene.ground.lamp, scene.ground.lamp_beam_deg),
+        shadows={r: DroneShadow(scene.light_of(r)) for r in ROBOTS} if scene.mav.shadow else {},
     )
     header = Header(
         scene=scene.name,
@@ -230,13 +235,16 @@ def _store_models(plan: FramePlan, flight: Flight) -> None:
 
 
 def _store_model(plan: FramePlan, files: WorldFiles, world: World) -> None:
+    light = world.scene.light_of("mav" if files == plan.worlds["mav"] else "ground")
     lenses: dict[Robot, Lens] = {
         "mav": plan.true.mav.camera.lens(),
         "ground": plan.true.ground.camera.lens(),
     }
     tiles = [tile for robot, lens in lenses.items() for tile in tiles_of(robot, lens)]
     cameras = {tile.name: tile.camera for tile in tiles}
-    model = with_cameras(world.spec, cameras)
+    spec = world.spec.copy()
+    add_bodies(spec, read_bodies(plan.motion.parent), None if files == plan.unlit else light)
+    model = with_cameras(spec, cameras)
     # MuJoCo only prints a warning when the disk is full.
     if shutil.disk_usage(plan.recording).free < mujoco.mj_sizeModel(model):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

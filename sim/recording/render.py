@@ -79,6 +79,14 @@ class Renderer:
         mujoco.mjr_readPixels(picture, stored, rect, self._context)
         return np.ascontiguousarray(picture[::-1]), self._metric(stored[::-1])
 
+    def place(self, poses: Mapping[str, SE3]) -> None:
+        """Move bodies of the world, by name, to their poses in `world`."""
+        for name, pose in poses.items():
+            mocap = int(self._model.body_mocapid[self._model.body(name).id])
+            self._data.mocap_pos[mocap] = pose.translation
+            self._data.mocap_quat[mocap] = np.roll(pose.quaternion_xyzw(), 1)
+        mujoco.mj_kinematics(self._model, self._data)
+
     def _render(self, camera: str, T_world_camera: SE3) -> mujoco.MjrRect:
         index = self._model.camera(camera).id
         self._data.cam_xpos[index] = T_world_camera.translation

@@ -6,6 +6,7 @@
 states). If boxes change before the MAV flies, these files hold what the ground robot sees;
 `surface_mav.ply` and `parts_mav.csv` hold what the MAV sees, and `changes.csv` what has changed.
 If sensors fail, `faults.csv` lists which, from when to when.
+Bodies that move are in `bodies.csv` and `body_NAME.tum`, and not in the surface.
 """
 
 from __future__ import annotations
@@ -29,9 +30,11 @@ from airground.io.lens import Lens
 from airground.io.tum import write_tum
 from sim.geometry.box import Box
 from sim.geometry.changes import Change
+from sim.recording.bodies_truth import BodySurfaces
 from sim.recording.row_poses import RowPoses, exact_row_poses
 from sim.recording.true_surface import TrueSurface
 from sim.robots.motion import ROBOTS, Motion, Robot
+from sim.robots.moving_bodies import MovingBody, read_bodies, write_bodies
 from sim.sensors.faults import Fault
 from sim.world.world import World
 
@@ -85,6 +88,15 @@ class Truth:
         middle_ns = stamp_ns + self.sensors(robot).camera.time_offset_ns
         return exact_row_poses(self.motion, robot, self.lens(robot), middle_ns)
 
+    def time_ns(self, robot: Robot, stamp_ns: int) -> int:
+        """Time of the motion at which an image's middle row was taken [ns]."""
+        return stamp_ns + self.sensors(robot).camera.time_offset_ns
+
+    @cached_property
+    def bodies(self) -> BodySurfaces:
+        """The bodies that move."""
+        return BodySurfaces(read_bodies(self.folder))
+
     def surface(self, robot: Robot) -> TrueSurface:
         """The true surface of the world that a robot sees."""
         return self._surfaces[robot]
@@ -101,6 +113,9 @@ class Truth:
         """
         rays = self.row_poses(robot, stamp_ns).rays_world(self.lens(robot).rays())
         depth = self.surface(robot).scene.cast_rays(rays)["t_hit"].numpy()
+        if self.bodies.bodies:
+            hits = self.bodies.hits(robot, rays.numpy(), self.time_ns(robot, stamp_ns))
+            depth = np.minimum(depth, hits.distance)
         return np.where(np.isfinite(depth), depth, np.float32(np.nan))
 
 
@@ -111,6 +126,7 @@ def write_truth(
     motion: Motion,
     calibration: CalibrationTable,
     faults: Sequence[Fault] = (),
+    bodies: Sequence[MovingBody] = (),
 ) -> None:
     """Write `truth/` into a recording's folder.
 
@@ -120,6 +136,7 @@ def write_truth(
         motion: Motion of both robots.
         calibration: True calibration of the sensors.
         faults: Failures of sensors, with their starts.
+        bodies: Bodies that move.
     """
     folder = recording / TRUTH
     folder.mkdir()
@@ -131,6 +148,7 @@ def write_truth(
         write_tum(folder / f"{robot}.tum", poses)
     _ground_surface(folder).write(drive)
     _write_boxes(folder / "boxes.csv", drive.boxes)
+    write_bodies(folder, bodies)
     if flight.changes:
         _mav_surface(folder).write(flight)
         _write_changes(folder / _CHANGES, flight.changes)

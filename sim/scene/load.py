@@ -10,6 +10,7 @@ from pydantic import ValidationError
 
 from airground.errors import InputError
 from airground.io.input_files import SETTINGS_LIMIT, parse_toml, read_text
+from sim.scene.bodies import Body
 from sim.scene.light import Light
 from sim.scene.part import Part
 from sim.scene.paths import GroundPath, MavPath
@@ -85,6 +86,7 @@ def _known_keys(location: tuple[Any, ...]) -> list[str]:
         "flight_light": Light,
         "rubble": Rubble,
         "terrain": Terrain,
+        "bodies": Body,
         "shelves": Shelves,
         "debris": Debris,
         "mav": MavPath,

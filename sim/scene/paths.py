@@ -24,6 +24,8 @@ class MavPath(Part):
     """Corners of the flight path; the first is `start` or near it [m]."""
     sway_m: Annotated[float, Field(ge=0, le=0.5)] = 0.08
     """Amplitude of the extra motion that excites the IMU [m]."""
+    shadow: bool = False
+    """Whether the MAV throws a shadow."""
     camera_f_px: Annotated[float, Field(gt=100, le=2000)] = 420.0
     """Focal length of the downward 752 x 480 camera [px]."""
 
@@ -45,6 +47,8 @@ class GroundPath(Part):
     """Irradiance by a lamp at the camera of what faces it at 1 m, in units of `light`."""
     lamp_beam_deg: Annotated[float, Field(ge=5, le=80)] = 30.0
     """Angle from the camera's axis at which the lamp shines half as bright [deg]."""
+    visible: bool = False
+    """Whether the MAV sees the ground robot."""
     stop_at_overlap: Fraction | None = None
     """The robot stops as soon as it has seen this share of what the MAV flies over (the
     median that `sim.robots.overlap` measures); without it, it drives all the way. The heap stays

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
+from sim.scene.bodies import Body
 from sim.scene.light import Light
 from sim.scene.part import Fraction, Part
 from sim.scene.paths import GroundPath, MavPath
@@ -49,8 +50,16 @@ class Scene(Part):
     terrain: Terrain | None = None
     shelves: Shelves | None = None
     debris: Debris | None = None
+    bodies: tuple[Body, ...] = ()
+    """Bodies that move while the robots look."""
     mav: MavPath
     ground: GroundPath
+
+    def light_of(self, robot: str) -> Light:
+        """The light in which the "mav" or the "ground" robot sees the world."""
+        if robot == "mav" and self.flight_light is not None:
+            return self.flight_light
+        return self.light
 
     @model_validator(mode="before")
     @classmethod
@@ -73,6 +82,7 @@ class Scene(Part):
             self._check_built()
         half = [side / 2 for side in self.room.size_m]
         places = [self.mav.start, *self.mav.waypoints, *(p[:2] for p in self.ground.waypoints)]
+        places += [place for body in self.bodies for place in body.waypoints]
         for x, y in places:
             if abs(x) > half[0] or abs(y) > half[1]:
                 raise ValueError(
