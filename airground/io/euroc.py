@@ -95,10 +95,11 @@ def _pose_yaml(pose: SE3) -> str:
 def _read_samples(path: Path, columns: int) -> tuple[I64, F64]:
     """(N,) stamps and (N, columns) values, all finite, in strict order of time."""
     lines = read_lines(path)
-    for number, line in enumerate(lines, start=1):
-        if line and not line.startswith("#"):
-            _check_whole_stamp(line, number, path)
-            break
+    numbered = enumerate((line.strip() for line in lines), start=1)
+    first = next(((k, line) for k, line in numbered if line and line[0] != "#"), None)
+    if first is None:
+        raise RecordingError(f"{path}: holds no entry")
+    _check_whole_stamp(first[1], first[0], path)
     dtype = np.dtype([("stamp", np.int64), ("values", np.float64, (columns,))])
     try:
         table = np.loadtxt(lines, dtype=dtype, delimiter=",", comments="#", ndmin=1)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from airground.core.arrays import U8
 from airground.core.cloud import PointCloud
 from airground.errors import InputError
-from airground.io.input_files import MODEL_LIMIT, read_bytes
+from airground.io.ply_elements import Table, read_elements
 
 _POSITION = [("x", "<f4"), ("y", "<f4"), ("z", "<f4")]
 _NORMAL = [("nx", "<f4"), ("ny", "<f4"), ("nz", "<f4")]
@@ -45,51 +45,27 @@ def write_ply(path: Path | str, cloud: PointCloud, sources: U8 | None = None) ->
 def read_ply(path: Path) -> tuple[PointCloud, U8 | None]:
     """Read what `write_ply` wrote: the cloud, and the sources if they are in the file.
     InputError if the file is missing, truncated, or holds another kind of PLY."""
+    table = read_elements(path, ("vertex",)).get("vertex")
+    if table is None:
+        raise InputError(f"{path}: PLY lacks element vertex")
+    names = table.dtype.names or ()
+    normals = _columns(path, table, _NORMAL) if "nx" in names else None
+    sources = _columns(path, table, _SOURCE)[:, 0] if "source" in names else None
+    position, colour = (_columns(path, table, fields) for fields in (_POSITION, _COLOUR))
     try:
-        data = read_bytes(path, MODEL_LIMIT)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    header, marker, body = data.partition(b"end_header\n")
-    if not data.startswith(b"ply\n") or not marker:
-        raise InputError(f"{path}: is no PLY file")
-    count, dtype = _parse_header(path, header.decode("ascii", "replace"))
-    if len(body) != count * dtype.itemsize:
-        raise InputError(
-            f"{path}: holds {len(body)} bytes of points, {count} points need "
-            f"{count * dtype.itemsize}"
-        )
-    table = np.frombuffer(body, dtype)
-    names = dtype.names or ()
-    normals = _columns(table, _NORMAL) if "nx" in names else None
-    sources = table["source"].copy() if "source" in names else None
-    try:
-        cloud = PointCloud(_columns(table, _POSITION), _columns(table, _COLOUR), normals)
+        return PointCloud(position, colour, normals), sources
     except ValueError as error:
         raise InputError(f"{path}: {error}") from None
-    return cloud, sources
 
 
-def _parse_header(path: Path, header: str) -> tuple[int, np.dtype[np.void]]:
-    """Number of points and the type of one."""
-    kinds = {ply: kind for kind, ply in _PLY_TYPES.items()}
-    count: int | None = None
-    fields: list[tuple[str, str]] = []
-    for line in header.splitlines()[1:]:
-        match line.split():
-            case ["format", "binary_little_endian", "1.0"] | ["comment", *_]:
-                pass
-            case ["element", "vertex", number] if number.isdecimal() and len(number) < 19:
-                count = int(number)
-            case ["property", kind, name] if kind in kinds and name not in dict(fields):
-                fields.append((name, kinds[kind]))
-            case _:
-                raise InputError(f"{path}: cannot read the PLY header line '{line[:60]}'")
-    names = {name for name, _ in fields}
-    missing = [name for name, _ in _POSITION + _COLOUR if name not in names]
-    if count is None or missing:
-        raise InputError(f"{path}: PLY lacks {', '.join(missing) or 'element vertex'}")
-    return count, np.dtype(fields)
-
-
-def _columns(table: NDArray[Any], fields: list[tuple[str, str]]) -> NDArray[Any]:
+def _columns(path: Path, table: Table, fields: list[tuple[str, str]]) -> NDArray[Any]:
+    kinds = {name: table.dtype[name] for name in table.dtype.names or ()}
+    for name, kind in fields:
+        if name not in kinds:
+            raise InputError(f"{path}: PLY lacks {name}")
+        if np.dtype(kinds[name]) != np.dtype(kind):
+            expected = _PLY_TYPES[kind]
+            raise InputError(
+                f"{path}: PLY has '{name}' of another type, expected binary {expected}"
+            )
     return np.stack([table[name] for name, _ in fields], axis=1)

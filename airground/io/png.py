@@ -6,6 +6,7 @@ RGB of 8 bits, not interlaced, are decoded."""
 from __future__ import annotations
 
 import struct
+import zlib
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,6 +36,8 @@ class PngHeader:
         """From a file's first bytes; ValueError where they are no header."""
         if len(data) < 33 or not data.startswith(SIGNATURE) or data[12:16] != b"IHDR":
             raise ValueError("the PNG image has no header")
+        if zlib.crc32(data[12:29]) != int.from_bytes(data[29:33], "big"):
+            raise ValueError("the PNG image is damaged: its header has another checksum")
         width, height, bits, colour, *methods = struct.unpack(">IIBBBBB", data[16:29])
         return cls(width, height, None if any(methods) else _KINDS.get((colour, bits)))
 

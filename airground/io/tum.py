@@ -4,6 +4,7 @@ Times are in seconds with nine decimals; they are read and written without round
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -57,7 +58,7 @@ def read_tum(path: Path | str) -> Trajectory:
             raise RecordingError(f"{path}:{number}: {error}") from None
         if not np.isfinite(values).all():
             raise RecordingError(f"{path}:{number}: the pose at {fields[0]} s is not finite")
-        if abs(np.linalg.norm(values[3:]) - 1) > 1e-2:
+        if abs(math.hypot(*values[3:]) - 1) > 1e-2:
             raise RecordingError(
                 f"{path}:{number}: the quaternion (qx qy qz qw) must have length 1"
             )

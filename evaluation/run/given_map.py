@@ -5,12 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import open3d as o3d
+from numpy.typing import NDArray
 
 from airground.core.cloud import PointCloud
 from airground.errors import InputError
-from airground.io.input_files import check_file
+from airground.io.ply_elements import Table, columns, read_elements
 
+COLOURS = ("red", "green", "blue")
 GREY = 128
 """Level of points without colours: the middle of 0 to 255."""
 
@@ -24,12 +25,10 @@ def read_map(path: Path) -> PointCloud:
     Raises:
         InputError: The file cannot be read, or its points are none, not finite or not in metres.
     """
-    _check_claim(path)
-    with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-        read = o3d.io.read_point_cloud(path, format="ply")
-    points = np.asarray(read.points, np.float32)
-    if len(points) == 0:
+    table = read_elements(path, ("vertex",)).get("vertex")
+    if table is None or len(table) == 0:
         raise InputError(f"{path}: no points could be read from this PLY file")
+    points = columns(path, table, ("x", "y", "z"))
     if not np.isfinite(points).all():
         raise InputError(f"{path}: every coordinate must be a finite number")
     extent = float(np.abs(points).max())
@@ -38,28 +37,16 @@ def read_map(path: Path) -> PointCloud:
             f"{path}: reaches {extent:.0f} m from its origin; expected metres, and at most "
             f"{MAX_EXTENT_M:.0f}"
         )
-    colours = np.full(points.shape, GREY, np.uint8)
-    if read.has_colors():
-        colours = np.rint(np.asarray(read.colors) * 255).astype(np.uint8)
-    return PointCloud(points, colours)
+    return PointCloud(points.astype(np.float32), _colours(path, table))
 
 
-def _check_claim(path: Path) -> None:
-    """Raise InputError if a header claims more elements than its file has bytes."""
-    try:
-        check_file(path)
-        with path.open("rb") as file:
-            start = file.read(4096)
-        size = path.stat().st_size
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    if not start.startswith(b"ply"):
-        raise InputError(f"{path}: is no PLY file")
-    for line in start.splitlines():
-        match line.split():
-            case [b"element", _, count] if not count.isdigit() or len(count) > 18:
-                raise InputError(f"{path}: is damaged: a number of elements is none")
-            case [b"element", _, count] if int(count) > size:
-                raise InputError(
-                    f"{path}: is truncated: it has {size} bytes for {int(count)} elements"
-                )
+def _colours(path: Path, table: Table) -> NDArray[np.uint8]:
+    """(N, 3) levels: as they are, or from fractions of 1; grey without any."""
+    if not set(COLOURS) <= set(table.dtype.names or ()):
+        return np.full((len(table), 3), GREY, np.uint8)
+    levels = columns(path, table, COLOURS)
+    if table.dtype["red"].kind == "f" and not (levels > 1).any():
+        levels = 255 * levels
+    if not ((levels >= 0) & (levels <= 255)).all():
+        raise InputError(f"{path}: a colour is not within 0 to 255")
+    return np.rint(levels).astype(np.uint8)

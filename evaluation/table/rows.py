@@ -116,7 +116,7 @@ class ResultTable:
         try:
             check_file(path)
             frame = pd.read_parquet(path)
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, MemoryError) as error:
             raise InputError(f"{path}: no readable results table ({error})") from error
         try:
             table = cls(frame)

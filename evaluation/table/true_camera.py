@@ -86,7 +86,9 @@ def read_euroc_poses(path: Path) -> Trajectory:
     except (ValueError, OverflowError) as error:
         raise RecordingError(f"{path}: expected stamp, x, y, z, qw, qx, qy, qz: {error}") from None
     quaternions = values[:, 3:]
-    off = ~(np.abs(np.linalg.norm(quaternions, axis=1) - 1) <= UNIT_TOLERANCE)  # or NaN
+    with np.errstate(over="ignore"):
+        lengths = np.linalg.norm(quaternions, axis=1)
+    off = ~(np.abs(lengths - 1) <= UNIT_TOLERANCE)  # or NaN
     if off.any():
         raise RecordingError(
             f"{path}: the quaternion (qw qx qy qz) at stamp {stamps[np.argmax(off)]} must have "

@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from airground.errors import RecordingError
-from airground.io.input_files import check_file
+from airground.errors import InputError, RecordingError
+from airground.io.ply_elements import columns, read_elements
 from sim.geometry.parts import Part, read_parts, write_parts
 from sim.world.world import World
+
+_EMPTY = np.zeros(0, [])
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,19 +37,22 @@ class TrueSurface:
         """The mesh; RecordingError if it is missing or damaged."""
         path = self.path
         try:
-            check_file(path)
-        except OSError as error:
-            raise RecordingError(f"{path}: no readable mesh: {error.strerror}") from None
-        with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
-            mesh = o3d.io.read_triangle_mesh(path)
-        if not mesh.has_triangles():
+            tables = read_elements(path, ("vertex", "face"))
+            vertices = columns(path, tables.get("vertex", _EMPTY), ("x", "y", "z"))
+        except InputError as error:
+            raise RecordingError(str(error)) from None
+        faces = tables.get("face", _EMPTY)
+        names = faces.dtype.names or ()
+        triangles = faces["vertex_indices"] if "vertex_indices" in names else np.zeros((0, 0))
+        if triangles.shape[1:] != (3,) or len(triangles) == 0 or triangles.dtype.kind not in "iu":
             raise RecordingError(f"{path}: no readable mesh with triangles")
-        vertices, triangles = np.asarray(mesh.vertices), np.asarray(mesh.triangles)
         if not np.isfinite(vertices).all():
             raise RecordingError(f"{path}: a vertex is not finite")
         if triangles.min() < 0 or triangles.max() >= len(vertices):
             raise RecordingError(f"{path}: a triangle has a vertex that is not there")
-        return mesh
+        return o3d.geometry.TriangleMesh(
+            o3d.utility.Vector3dVector(vertices), o3d.utility.Vector3iVector(triangles)
+        )
 
     @cached_property
     def scene(self) -> o3d.t.geometry.RaycastingScene:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import signal
 import tempfile
@@ -9,6 +10,7 @@ from collections import Counter
 from collections.abc import Iterator
 from multiprocessing.connection import Connection
 from pathlib import Path
+from typing import Any
 
 from tests.fuzz.case import WAIT_S, Bench, Outcome, too_long
 
@@ -30,15 +32,13 @@ def outcomes(seed: int, numbers: range) -> Iterator[Outcome]:
                 assert mine.poll(START_S), "the process does not start"
                 mine.recv()
                 while left:
-                    try:
-                        found = mine.recv() if mine.poll(2 * WAIT_S) else None
-                    except EOFError:
-                        found = None
+                    what = _receive(mine) or ("?", "?", "?")
+                    found = _receive(mine)
                     if found is None:
                         process.kill()
                         process.join()
                         words = f"exit code {process.exitcode}"
-                        found = Outcome(left[0], "?", "?", "?", "dies or stands still", words, 0.0)
+                        found = Outcome(left[0], *what, "dies or stands still", words, 0.0)
                     left.pop(0)
                     yield found
                     if not process.is_alive() and left:
@@ -48,6 +48,14 @@ def outcomes(seed: int, numbers: range) -> Iterator[Outcome]:
                 process.join()
 
 
+def _receive(pipe: Connection) -> Any:
+    """What the process says next; None if it says nothing more."""
+    try:
+        return pipe.recv() if pipe.poll(2 * WAIT_S) else None
+    except EOFError:
+        return None
+
+
 def _work(folder: str, seed: int, numbers: list[int], pipe: Connection) -> None:
     signal.signal(signal.SIGALRM, too_long)
     signal.signal(signal.SIGPROF, too_long)
@@ -55,9 +63,10 @@ def _work(folder: str, seed: int, numbers: list[int], pipe: Connection) -> None:
     tempfile.tempdir = scratch
     bench = Bench(Path(scratch))
     bench.check_good()
+    gc.freeze()  # or each collection between cases looks at all that was imported
     pipe.send("ready")
     for number in numbers:
-        pipe.send(bench.run(seed, number))
+        pipe.send(bench.run(seed, number, lambda *what: pipe.send(what)))
 
 
 def table(found: list[Outcome]) -> str:

@@ -40,6 +40,10 @@ CHATTER = ("RPly:",)
 PLACE = "another thing in its place"
 
 
+Announce = Callable[[str, str, str], object]
+"""Consumer of an input, a damage and a file, before the input is used."""
+
+
 @dataclass(frozen=True)
 class Outcome:
     """What became of one input.
@@ -70,8 +74,8 @@ class Bench:
         self._folder = folder
         self._contents: dict[str, dict[Path, bytes]] = {}
 
-    def run(self, seed: int, number: int) -> Outcome:
-        """Draw a case, damage the input, use it, and mend it."""
+    def run(self, seed: int, number: int, announce: Announce) -> Outcome:
+        """Draw a case, damage the input, say so, use it, and mend it."""
         rng = np.random.default_rng([seed, number])
         weights = np.array([subject.weight for subject in SUBJECTS.values()], float)
         name = str(rng.choice(list(SUBJECTS), p=weights / weights.sum()))
@@ -82,6 +86,7 @@ class Bench:
         path = files[int(rng.integers(len(files)))]
         damage = self._damage(path, contents[path], rng)
         relative = str(path.relative_to(self._folder / "in" / name))
+        announce(name, damage, relative)
         try:
             verdict, words, seconds = self._use(name, number % WORKED_ON == 0)
         finally:

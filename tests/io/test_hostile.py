@@ -181,7 +181,7 @@ def test_clouds_that_claim_more_than_they_hold(tmp_path: Path, what: str) -> Non
     file = tmp_path / "a.ply"
     header = f"ply\nformat binary_little_endian 1.0\n{PLY_HEADERS[what]}\nend_header\n"
     file.write_bytes(header.encode() + bytes(15))
-    refused(lambda: read_ply(file), r"a\.ply: (cannot read the PLY header line|holds 15 bytes)")
+    refused(lambda: read_ply(file), r"a\.ply: (cannot read the PLY header line|is truncated)")
 
 
 def test_samples_that_no_imu_measures(tmp_path: Path) -> None:

@@ -53,11 +53,12 @@ def test_open3d_reads_the_same_cloud(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("damage", "pattern"),
     [
-        (lambda data: data[:-1], "bytes of points"),
+        (lambda data: data[:-1], "is truncated"),
         (lambda data: data[1:], "no PLY"),
-        (lambda data: data.replace(b"binary_little_endian", b"ascii"), "format ascii"),
-        (lambda data: data.replace(b"property float x\n", b""), "lacks x"),
-        (lambda data: data.replace(b"uchar red", b"double red"), "double red"),
+        (lambda data: data.replace(b"binary_little_endian", b"ascii"), "is truncated"),
+        (lambda data: data.replace(b"property float x\n", b""), "has more after"),
+        (lambda data: data.replace(b"property float x", b"property float a"), "lacks x"),
+        (lambda data: data.replace(b"uchar red", b"char red"), "'red' of another type"),
     ],
 )
 def test_a_damaged_file_is_reported(tmp_path: Path, damage, pattern: str) -> None:

@@ -252,7 +252,7 @@ def test_invalid_maps_are_refused(tmp_path: Path) -> None:
     )
     bad = {
         "4000000000": ("0 0 0", "truncated"),
-        "-1": ("0 0 0", "a number of elements is none"),
+        "-1": ("0 0 0", "cannot read the PLY header line"),
         "0": ("", "no points"),
         "1": ("nan 0 0", "finite"),
         "2": ("0 0 0\n4000 0 0", "expected metres"),
