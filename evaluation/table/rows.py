@@ -120,7 +120,7 @@ class ResultTable:
             raise InputError(f"{path}: no readable results table ({error})") from error
         try:
             table = cls(frame)
-        except (TypeError, ValueError, OverflowError) as error:
+        except (TypeError, ValueError, OverflowError, MemoryError) as error:
             raise InputError(f"{path}: a column has values of a wrong type ({error})") from None
         table.check_once(str(path))
         return table
