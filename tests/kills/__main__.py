@@ -16,36 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.kills.commands import RESUMING, SAME, commands, make_inputs
 from tests.kills.victim import Command, digest
-from tests.sim.small_flight import SCENE
 
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
-QUICK = ("protocol.sequences_per_flight=1", "protocol.trials=2", "protocol.baselines=0")
-SAME: dict[str, tuple[str, ...]] = {
-    "simulate": (),
-    "export": (),
-    "run": (".ply", ".tum", "config.toml"),
-    "live": ("config.toml",),
-    "sweep": ("config.toml",),
-    "reproduce": ("config.toml",),
-}
-"""Endings of the files that a second run must repeat; the others hold times of this machine."""
-
-
-def commands(folder: Path) -> dict[str, tuple[str, ...]]:
-    """Words of each verb on the smallest flight; `folder` holds its scene and recording."""
-    scene, recording = str(folder / "small.toml"), str(folder / "recording")
-    sets = tuple(word for one in QUICK for word in ("--set", one))
-    oracle = ("--poses", "oracle")
-    flights = ("--scenes", scene, "--flights", "1", *oracle, *sets)
-    return {
-        "simulate": ("simulate", scene, "--threads", "2"),
-        "export": ("export", recording, "--format", "euroc"),
-        "run": ("run", recording, *oracle),
-        "live": ("live", recording, "--rate", "2"),
-        "sweep": ("sweep", "--vary", "localization.particles=50,80", *flights),
-        "reproduce": ("reproduce", "--alone", *flights),
-    }
 
 
 def main() -> int:
@@ -59,9 +33,7 @@ def main() -> int:
     lost = 0
     with tempfile.TemporaryDirectory(prefix="airground-kills-") as name:
         folder = Path(name)
-        scene = SCENE.replace("takeoff_s = 1.6", "takeoff_s = 0.2").replace("= 5.0\n", "= 3.4\n", 1)
-        (folder / "small.toml").write_text(scene)
-        Command(commands(folder)["simulate"], folder, "recording").finish()
+        make_inputs(folder)
         print("| verb | kills | while it ran | left after a kill | lost |\n|---|---|---|---|---|")
         for verb in asked.verbs:
             lost += kill_often(verb, commands(folder)[verb], folder, asked.count, asked.seed)
@@ -85,14 +57,14 @@ def kill_often(verb: str, words: tuple[str, ...], folder: Path, count: int, seed
             left[kind] += bool(names)
         faults += [f"{number.name}: process {one} stays" for one in after.processes]
         faults += [f"{number.name}: shared memory {one} stays" for one in after.shared]
-        if code == 0 or verb not in ("sweep", "reproduce"):
+        if code == 0 or verb not in RESUMING:
             if victim.whole() and code != 0:
                 faults.append(f"{number.name}: exit code {code}, but the output looks whole")
-            shutil.rmtree(victim.folder / victim.out, ignore_errors=True)
+            shutil.rmtree(victim.output(), ignore_errors=True)
     victim.finish()
     beside = {path.name for path in victim.folder.iterdir()} - {"tmp", "stderr", victim.out}
     faults += [f"{one} stays after a whole run" for one in beside]
-    one, other = (digest(each.folder / each.out, SAME[verb]) for each in (good, victim))
+    one, other = (digest(each.output(), SAME[verb]) for each in (good, victim))
     faults += [] if one == other else ["the bytes differ from a run without kills"]
     said = ", ".join(f"{kind.replace('_', ' ')} {n}" for kind, n in left.items() if n) or "nothing"
     print(f"| {verb} | {count} | {hits} | {said} | {len(faults)} |", flush=True)

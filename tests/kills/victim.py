@@ -31,20 +31,24 @@ class Left:
 
 @dataclass(frozen=True)
 class Command:
-    """The words of a command, which writes `out`; `folder` holds it and its temporary files."""
+    """The words of a command, which writes `out`; `folder` holds it and its temporary files.
+
+    What it prints goes to `log`, by default in the same folder.
+    """
 
     words: tuple[str, ...]
     folder: Path
     out: str = "out"
+    log: Path | None = None
 
     def start(self) -> subprocess.Popen[bytes]:
         temporary = self.folder / "tmp"
         temporary.mkdir(exist_ok=True)
         return subprocess.Popen(
-            [sys.executable, "-c", MAIN, *self.words, "--out", str(self.folder / self.out)],
+            [sys.executable, "-c", MAIN, *self.words, "--out", str(self.output())],
             env=os.environ | {"TMPDIR": str(temporary)},
             stdout=subprocess.DEVNULL,
-            stderr=(self.folder / "stderr").open("wb"),
+            stderr=self.errors().open("wb"),
             start_new_session=True,
         )
 
@@ -52,7 +56,7 @@ class Command:
         """Seconds of a run to the end, which must succeed."""
         started = time.monotonic()
         code = self.start().wait()
-        assert code == 0, f"exit code {code}: {(self.folder / 'stderr').read_text()[-500:]}"
+        assert code == 0, f"exit code {code}: {self.errors().read_text()[-500:]}"
         return time.monotonic() - started
 
     def kill(self, after_s: float, number: signal.Signals, child: int | None) -> tuple[int, Left]:
@@ -90,7 +94,14 @@ class Command:
         return code, Left(processes, tuple(shared), temporary, tuple(beside))
 
     def whole(self) -> bool:
-        return (self.folder / self.out).exists()
+        return self.output().exists()
+
+    def output(self) -> Path:
+        return self.folder / self.out
+
+    def errors(self) -> Path:
+        """What it printed to stderr."""
+        return self.log or self.folder / "stderr"
 
 
 def shared_names() -> set[str]:
