@@ -131,7 +131,7 @@ def _make(maker: FrameMaker, task: Task) -> list[Written]:
     return [written for index in range(first, end) for written in maker.make(robot, index)]
 
 
-_maker: FrameMaker | None = None  # one a process
+_maker: FrameMaker | AirgroundError | None = None  # one a process
 
 
 def _start_worker(plan: FramePlan, threads: int) -> None:
@@ -139,14 +139,23 @@ def _start_worker(plan: FramePlan, threads: int) -> None:
     end_with_parent()
     os.environ.setdefault("LP_NUM_THREADS", str(threads))  # of Mesa's software renderer
     cv2.setNumThreads(1)
-    _maker = FrameMaker(plan)
+    try:
+        _maker = FrameMaker(plan)
+    except (AirgroundError, OSError) as error:
+        # Told with the first task: what is raised here breaks the pool and prints a traceback.
+        _maker = AirgroundError(f"{plan.recording}: cannot be read: {error}")
+
+
+def _made() -> FrameMaker:
+    assert _maker is not None
+    if isinstance(_maker, AirgroundError):
+        raise _maker
+    return _maker
 
 
 def _work(task: Task) -> list[Written]:
-    assert _maker is not None
-    return _make(_maker, task)
+    return _make(_made(), task)
 
 
 def _draw(robot: Robot, index: int) -> Any:
-    assert _maker is not None
-    return _maker.mav(index) if robot == "mav" else _maker.ground(index)
+    return _made().mav(index) if robot == "mav" else _made().ground(index)

@@ -48,7 +48,7 @@ def read_robot(path: Path, robot: Source, calibration_file: Path | None = None) 
         pass
     true_pose = true_camera(recording)
     if true_pose is not None:
-        true_pose(int(recording.camera_stamps[1]))
+        true_pose(int(recording.camera_stamps[-1]))
 
 
 def make_recording(folder: Path) -> None:

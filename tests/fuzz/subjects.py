@@ -14,6 +14,7 @@ import numpy as np
 
 from airground.config import Config
 from airground.core.cloud import PointCloud
+from airground.io.input_files import SETTINGS_LIMIT, read_bytes
 from airground.io.ply import read_ply, write_ply
 from airground.io.tum import read_tum
 from evaluation.datasets.plan import Plan
@@ -107,13 +108,18 @@ def make_settings(folder: Path) -> None:
 def read_settings(folder: Path, out: Path) -> None:
     """As every verb with `--config`, `--set`, `--vary` and `--cluster`."""
     write_config(resolve(file=folder / "config.toml"), out / "config.toml")
-    words = (folder / "words.txt").read_text(errors="surrogateescape").splitlines()
+    words = _words(folder / "words.txt")
     settings = resolve_all(overrides=words, sections=EVALUATOR_SECTIONS)
-    vary = (folder / "vary.txt").read_text(errors="surrogateescape").splitlines()
+    vary = _words(folder / "vary.txt")
     start = DialSubject(load_scene("flat"), sensor_preset("nominal"), settings.pipeline())
     for point in points(parse_vary(vary)):
         turned(start, point)
     read_jobs(folder / "jobs.yaml")
+
+
+def _words(file: Path) -> list[str]:
+    """Words of a command line, from a file: as they come from a shell, whatever their bytes."""
+    return read_bytes(file, SETTINGS_LIMIT).decode(errors="surrogateescape").splitlines()
 
 
 def make_run(folder: Path) -> None:

@@ -99,8 +99,10 @@ class Bag:
             yield time_ns, self.decoded(topic, data)
 
     def first(self, topic: str) -> Any:
-        """The first message of a topic that has some."""
-        return next(self.messages(topic))[1]
+        """The first message of a topic; RecordingError if it has none, or is damaged."""
+        for _, message in self.messages(topic):
+            return message
+        raise RecordingError(f"{self.path}: {topic}: holds no message")
 
     def _check_definition(self, topic: str, connections: list[Any]) -> None:
         """RecordingError where a type is unknown, or a bag of ROS 1 defines it otherwise."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -198,12 +197,12 @@ def _turned(subject: Subject, name: str, value: Value) -> Subject:
         section, _, key = name.partition(".")
         origin = f"--vary {name}"
         return replace(subject, config=with_value(subject.config, section, key, value, origin))
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or value != value:
         raise InputError(f"--vary {name}: {value!r} is no number")
     if not dial.low <= value <= dial.high:
         unit = f" {dial.unit}" if dial.unit else ""
         raise InputError(
-            f"--vary {name}: {value:g} is out of its range, {dial.low:g} to {dial.high:g}{unit}"
+            f"--vary {name}: {value!r:.20} is out of its range, {dial.low:g} to {dial.high:g}{unit}"
         )
     return dial.turn(subject, float(value))
 

@@ -18,12 +18,12 @@ import sys
 from pathlib import Path
 from typing import Any, cast
 
-import yaml
 from distributed import SpecCluster
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from airground.errors import InputError
-from airground.io.input_files import SETTINGS_LIMIT, read_text
+from airground.errors import InputError, RecordingError
+from airground.io.input_files import SETTINGS_LIMIT, check_file
+from airground.io.sensor_file import read_mapping
 
 CLASSES = {
     "slurm": "SLURMCluster",
@@ -87,11 +87,12 @@ def read_jobs(file: Path) -> Jobs:
         InputError: The file cannot be read, or an entry is invalid.
     """
     try:
-        jobs = Jobs.model_validate(yaml.safe_load(read_text(file, SETTINGS_LIMIT)))
+        check_file(file, SETTINGS_LIMIT)
+        jobs = Jobs.model_validate(read_mapping(file))
     except OSError as error:
         raise InputError(f"--cluster {file}: {error.strerror}") from None
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise InputError(f"--cluster {file}: no YAML: {error}") from None
+    except RecordingError as error:
+        raise InputError(f"--cluster {error}") from None
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"])) or "the file"

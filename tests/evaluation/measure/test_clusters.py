@@ -113,8 +113,9 @@ def test_a_batch_system_is_configured_as_for_dask_jobqueue(tmp_path: Path) -> No
         ("jobs: 8", "jobs: 0", "jobs: Input should be greater"),
         ("jobs: 8", "jobs: 8\nworkers: 3", "workers: Extra inputs"),
         ("slurm:", "slrm:", "unknown system 'slrm'; known: slurm"),
-        ("jobqueue:", "jobqueue: [", "no YAML"),
-        ("8", "!!python/object/apply:os.system ['true']", "no YAML"),
+        ("jobqueue:", "jobqueue: [", "cannot be read"),
+        ("8", "!!python/object/apply:os.system ['true']", "cannot be read"),
+        ("jobqueue:", "jobqueue: " + 900 * "[", "nested too deep"),
         ("processes: 4", "processes: 2", "must be the same number"),
     ],
 )
