@@ -16,6 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from airground.core.arrays import F64, Floats, read_only
 
+FARTHEST_M = 1e9
+"""No place is farther from the origin of its frame [m]: its digits would be lost."""
 ROTATION_TOLERANCE = 1e-6
 _NEWTON = 1.5 * np.eye(3)
 

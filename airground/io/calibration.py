@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
 from airground.core.messages import ImuNoise, RobotCalibration
-from airground.core.se3 import ROTATION_TOLERANCE, SE3
+from airground.core.se3 import FARTHEST_M, ROTATION_TOLERANCE, SE3
 from airground.io.lens import COEFFICIENTS, MAX_READOUT_S, Lens, Model, Undistortion
 
 Positive = Annotated[float, Field(gt=0)]
@@ -28,6 +28,8 @@ class Table(BaseModel):
 
 def _rigid(rows: tuple[Row, Row, Row, Row]) -> tuple[Row, Row, Row, Row]:
     matrix = np.array(rows)
+    if not (np.abs(matrix) < FARTHEST_M).all():
+        raise ValueError(f"a length must be below {FARTHEST_M:g} m")
     off = float(np.abs(matrix[:3, :3] @ matrix[:3, :3].T - np.eye(3)).max())
     if off > ROTATION_TOLERANCE or np.linalg.det(matrix[:3, :3]) < 0:
         raise ValueError(f"the upper left 3x3 must be a rotation, it is off by {off:.1e}")

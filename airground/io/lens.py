@@ -81,7 +81,9 @@ class Lens:
 
     def folds(self) -> bool:
         """Whether the image turns back toward its middle before it reaches its nearest side, so
-        that two directions share a pixel."""
+        that two directions share a pixel, or no pinhole camera sees what it sees."""
+        if self.bends and self.model != "equidistant" and not (_pinhole_matrix(self) >= 0).all():
+            return True
         fx, fy, cx, cy = self.intrinsics
         nearest = min(cx / fx, cy / fy, (self.width - 1 - cx) / fx, (self.height - 1 - cy) / fy)
         k = np.array([*self.distortion, *np.zeros(8)])
@@ -199,10 +201,17 @@ Maps = tuple[F64, NDArray[Any], NDArray[Any]]
 
 def _radial(lens: Lens) -> Maps:
     size, original, distortion = (lens.width, lens.height), lens.matrix(), np.array(lens.distortion)
-    optimal, _ = cv2.getOptimalNewCameraMatrix(original, distortion, size, 0.0, size)
-    matrix = np.asarray(optimal, np.float64)
+    matrix = _pinhole_matrix(lens)
     x, y = cv2.initUndistortRectifyMap(original, distortion, np.eye(3), matrix, size, cv2.CV_32FC1)
     return matrix, x, y
+
+
+def _pinhole_matrix(lens: Lens) -> F64:
+    """(3, 3) matrix of the widest pinhole camera whose pixels the lens all sees."""
+    size = (lens.width, lens.height)
+    distortion = np.array(lens.distortion)
+    optimal, _ = cv2.getOptimalNewCameraMatrix(lens.matrix(), distortion, size, 0.0, size)
+    return np.asarray(optimal, np.float64)
 
 
 def _fisheye(lens: Lens) -> Maps:

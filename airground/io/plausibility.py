@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from airground.core.arrays import F64, I64
 from airground.core.messages import ImuSamples
-from airground.core.se3 import SE3, nearest_rotation
+from airground.core.se3 import FARTHEST_M, SE3, nearest_rotation
 from airground.errors import RecordingError
 
 CAMERA_STEP_S = (1e-3, 10.0)
@@ -142,7 +142,7 @@ def rigid(numbers: ArrayLike, path: Path, key: str, tolerance: float = RIGID_TOL
         raise RecordingError(f"{path}: key '{key}': expected 16 numbers, got {matrix.size}")
     matrix = matrix.reshape(4, 4)
     rotation = matrix[:3, :3]
-    if not np.isfinite(matrix).all() or not (matrix[3] == (0, 0, 0, 1)).all():
+    if not (np.abs(matrix) < FARTHEST_M).all() or not (matrix[3] == (0, 0, 0, 1)).all():
         raise RecordingError(f"{path}: key '{key}': expected finite rows and a last of 0, 0, 0, 1")
     off = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
     if off > tolerance or np.linalg.det(rotation) < 0:

@@ -109,25 +109,30 @@ class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
 
 @dataclass(frozen=True, kw_only=True)
 class Render(Verb):
-    """Add exact truth of every pixel to a recording.
+    """Add exact truth of every pixel, or a lidar's scans, to a recording.
 
-    That is depth, normals, segmentation and optical flow. It follows from the stored motion and
-    surface, without simulating again. docs/datasets.md has the encodings.
+    Depth, normals, segmentation and optical flow of both robots' images, and scans of a rotating
+    lidar on the ground robot. All follow from the stored motion and surface, without simulating
+    again. docs/datasets.md has the encodings.
     """
 
     recording: Annotated[Positional[Path], Shown("RECORDING")]
     """folder that simulate has written"""
     add: Annotated[str, Shown("LIST")]
-    """what to add, of depth, normals, segmentation, flow; as in depth,flow"""
+    """what to add, of depth, normals, segmentation, flow, lidar; as in depth,flow"""
     robot: Literal["mav", "ground", "both"] = "both"
     """robot whose images are rendered"""
     every: Annotated[int, Shown("N")] = 1
-    """every so many-th image; flow leads to the next of all images"""
+    """every so many-th image or scan; flow leads to the next of all images"""
+    beams: Annotated[int, Shown("N")] = 32
+    """beams of the lidar, 16 to 128"""
     out: Annotated[Path | None, Shown("DIR", "truth/ in the recording")] = None
-    """folder for ROBOT_depth/ and so on; these must not exist"""
+    """folder for ROBOT_depth/, ground_lidar/ and so on; these must not exist"""
 
     def main(self) -> None:
+        from evaluation.datasets.lidar_files import count_scans, render_scans
         from evaluation.datasets.pixel_truth_files import (
+            LIDAR,
             Wanted,
             count_images,
             parse_modalities,
@@ -136,14 +141,23 @@ class Render(Verb):
         from evaluation.datasets.simulated import Simulated
         from evaluation.setup.progress import step
         from sim.robots.motion import ROBOTS
+        from sim.sensors.lidar import Lidar
 
         robots = ROBOTS if self.robot == "both" else (self.robot,)
         every = int(in_range("--every", self.every, low=1))
-        wanted = Wanted(robots, parse_modalities(self.add), every)
+        added = parse_modalities(self.add)
+        wanted = Wanted(robots, tuple(name for name in added if name != LIDAR), every)
+        lidar = Lidar(beams=self.beams)
+        if LIDAR in added and "ground" not in robots:
+            raise InputError("--add lidar: the ground robot carries it; give no --robot mav")
         simulated = Simulated.open(self.recording)
         out = simulated.truth.folder if self.out is None else self.out
-        with step("rendering", count_images(simulated, wanted), "images") as rendering:
-            render_truth(simulated, wanted, out, self.workers(), rendering.advance)
+        if wanted.modalities:
+            with step("rendering", count_images(simulated, wanted), "images") as rendering:
+                render_truth(simulated, wanted, out, self.workers(), rendering.advance)
+        if LIDAR in added:
+            with step("scanning", count_scans(simulated, lidar, every), "scans") as scanning:
+                render_scans(simulated, lidar, every, out, scanning.advance)
 
 
 @dataclass(frozen=True, kw_only=True)

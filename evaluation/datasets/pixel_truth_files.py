@@ -29,6 +29,9 @@ from sim.recording.pixel_truth import (
 from sim.robots.motion import Robot
 
 MODALITIES = ("depth", "normals", "segmentation", "flow")
+LIDAR = "lidar"
+KNOWN = (*MODALITIES, LIDAR)
+"""What can be added to a recording: truth of every pixel, and scans of a lidar."""
 FLOW_STEP_PX = 1 / 64
 """Resolution of KITTI's 16-bit flow [px]."""
 _FLOW_ZERO, _NORMAL_ZERO = 32768, 32768
@@ -60,12 +63,12 @@ class Wanted:
 
 
 def parse_modalities(words: str) -> tuple[str, ...]:
-    """`depth,flow` as a tuple in the order of `MODALITIES`; InputError names a wrong word."""
+    """`depth,flow` as a tuple in the order of `KNOWN`; InputError names a wrong word."""
     asked = [word.strip() for word in words.split(",")]
     for word in asked:
-        if word not in MODALITIES:
-            raise InputError(f"--add {word}: unknown; known: {', '.join(MODALITIES)}")
-    return tuple(name for name in MODALITIES if name in asked)
+        if word not in KNOWN:
+            raise InputError(f"--add {word}: unknown; known: {', '.join(KNOWN)}")
+    return tuple(name for name in KNOWN if name in asked)
 
 
 def render_truth(

@@ -35,8 +35,6 @@ MEMORY_MIB = 1024
 """Most memory by which a process may grow over one input [MiB]."""
 LONGEST_LINE = 1000
 """Characters of the longest message that a reader can take in."""
-CHATTER = ("RPly:",)
-"""Starts of lines that a C library prints and that cannot be switched off."""
 PLACE = "another thing in its place"
 
 
@@ -167,7 +165,7 @@ def judge(use: Callable[[], object], screen_file: Path) -> tuple[str, str, float
 
 def verdict_on(code: int, words: str, seconds: float, grown_mib: float) -> str:
     """What an exit code, the screen, time and memory mean together."""
-    lines = [line for line in words.splitlines() if line.strip() and not line.startswith(CHATTER)]
+    lines = [line for line in words.splitlines() if line.strip()]
     if code == console.EXIT_INTERNAL:
         return "traceback"
     if "out of memory" in words or grown_mib > MEMORY_MIB:
