@@ -142,7 +142,7 @@ def _start_worker(plan: FramePlan, threads: int) -> None:
     try:
         _maker = FrameMaker(plan)
     except (AirgroundError, OSError) as error:
-        # Told with the first task: what is raised here breaks the pool and prints a traceback.
+        # Raised with the first task: an error here breaks the pool and prints a traceback.
         _maker = AirgroundError(f"{plan.recording}: cannot be read: {error}")
 
 
