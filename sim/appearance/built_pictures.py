@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from sim.appearance.bake_light import LightBaker
 from sim.appearance.cardboard import FaceKind, Make, paint_face
+from sim.appearance.house_front import paint_front
 from sim.appearance.masonry import (
     paint_brickwork,
     paint_chipboard,
     paint_concrete_face,
+    paint_paving,
     paint_steel,
 )
 from sim.appearance.pictures import cube_faces, face_light, lit_cube
@@ -21,12 +23,12 @@ from sim.geometry.box import Box
 from sim.geometry.noise import Image
 from sim.geometry.parts import Kind
 
-REPEATED: tuple[Kind, ...] = ("box", "post", "board")
+REPEATED: tuple[Kind, ...] = ("box", "post", "board", "pavement")
 """Things of these kinds and of one size have one picture; only light differs."""
 PX_PER_M = 400.0
 """Finest picture of what is built: a camera at 1 m sees 420 to 525 pixels a metre."""
-RACK_PX_PER_M = 200.0
-"""The same of boards and posts: boxes and edges hide most of them."""
+COARSE_PX_PER_M: dict[Kind, float] = {"board": 200, "post": 200, "pavement": 160, "front": 70}
+"""The same of what is mostly hidden, or far from the cameras."""
 _LEAST_PX, _MOST_PX = 96, 512
 _Painter = Callable[[tuple[float, float], float, np.random.Generator], Image]
 _PAINTERS: dict[Kind, _Painter] = {
@@ -36,6 +38,8 @@ _PAINTERS: dict[Kind, _Painter] = {
     "slab": paint_concrete_face,
     "beam": paint_concrete_face,
     "brick": paint_brickwork,
+    "pavement": paint_paving,
+    "front": paint_front,
 }
 
 
@@ -82,6 +86,6 @@ def _painted(
 
 def _side(box: Box) -> int:
     """Pixels of a side of the cube picture: those of the longest edge, in steps of 32."""
-    px_per_m = RACK_PX_PER_M if box.kind in ("board", "post") else PX_PER_M
+    px_per_m = COARSE_PX_PER_M.get(box.kind, PX_PER_M)
     wanted = 32 * round(float(box.size_m.max()) * px_per_m / 32)
     return int(np.clip(wanted, _LEAST_PX, _MOST_PX))

@@ -13,6 +13,9 @@ from sim.geometry.noise import Image, octave_noise, smooth_noise
 
 _CONCRETE: Colour = (154, 151, 145)
 _PLASTER: Colour = (196, 193, 184)
+_ASPHALT: Colour = (92, 92, 94)
+LINE_M = 3.0
+"""Length of a dash and its gap in the middle of a road [m]."""
 _COVERING: Colour = (134, 138, 142)
 
 
@@ -61,6 +64,32 @@ def paint_plaster(size_m: tuple[float, float], px_per_m: float, rng: np.random.G
     _arcs(sheet, 90, (0.1, 0.8), 0.2)
     for _ in range(int(2 * size_m[0])):
         _notice(sheet)
+    return sheet.pixels
+
+
+def paint_asphalt(size_m: tuple[float, float], px_per_m: float, rng: np.random.Generator) -> Image:
+    """A road along x: aggregate, patches, cracks, oil, a broken line along the middle."""
+    sheet = _blank(size_m, px_per_m, rng)
+    grain = rng.standard_normal(sheet.shape, np.float32)
+    stones = np.asarray(cv2.GaussianBlur(grain[::-1], (0, 0), 1.0), np.float32)
+    tone = 1 + np.float32(0.06) * octave_noise(sheet.shape, 2.0 * px_per_m, 4, rng, 0.7)
+    tone += np.float32(0.09) * grain + np.float32(0.45) * np.maximum(stones - np.float32(0.3), 0)
+    sheet.pixels[:] = np.array(_ASPHALT, np.float32) * tone[..., None]
+    height, width = sheet.shape
+    for _ in range(int(0.03 * np.prod(size_m))):
+        x, y = rng.uniform(0, 1, 2) * (width, height)
+        a, b = rng.uniform(0.4, 1.6, 2) * px_per_m
+        patch = sheet.pixels[int(y) : int(y + a), int(x) : int(x + b)]
+        patch *= np.float32(rng.uniform(0.72, 0.9))
+    middle, half = height // 2, max(1, round(0.06 * px_per_m))
+    paint = np.zeros(sheet.shape, np.float32)
+    for x in np.arange(0.5, size_m[0], LINE_M) * px_per_m:
+        paint[middle - half : middle + half, int(x) : int(x + LINE_M / 2 * px_per_m)] = 0.75
+    sheet.blend((222, 220, 210), paint * np.clip(1 - np.float32(0.25) * np.abs(grain), 0, 1))
+    _spots(sheet, int(0.12 * np.prod(size_m)), (0.05, 0.35), 0.4)
+    _arcs(sheet, int(1.5 * np.prod(size_m)), (0.2, 1.5), 0.2)
+    _cracks(sheet, int(0.15 * np.prod(size_m)))
+    _litter(sheet, int(4 * np.prod(size_m)))
     return sheet.pixels
 
 

@@ -12,6 +12,8 @@ BRICK_M = (0.24, 0.071)
 """Length and height of a brick (German normal format) [m]."""
 MORTAR_M = 0.011
 """Thickness of a joint [m]."""
+FLAG_M = 0.5
+"""Edge of a flag of a pavement [m]."""
 _CONCRETE: Colour = (158, 154, 147)
 _MORTAR: Colour = (172, 166, 154)
 _RED: Colour = (146, 88, 70)
@@ -67,6 +69,24 @@ def paint_brickwork(
     sheet.darken(np.where(cover > 0, tone, 1 + np.float32(0.5) * (tone - shade)))
     _broken_rim(sheet)
     return sheet.pixels
+
+
+def paint_paving(size_m: tuple[float, float], px_per_m: float, rng: np.random.Generator) -> Image:
+    """Square flags of concrete with open joints, or a kerb where a side is low."""
+    pixels = paint_concrete_face(size_m, px_per_m, rng)
+    scale = pixels.shape[1] / size_m[0]
+    sheet = Sheet(pixels, scale, rng)
+    height, width = sheet.shape
+    for x in np.arange(FLAG_M, size_m[0] - 0.1, FLAG_M) * scale:
+        sheet.crease((x, 0), (x, height), 0.5, 2)
+    if size_m[1] > FLAG_M:
+        flags = (int(np.ceil(size_m[1] / FLAG_M)), int(np.ceil(size_m[0] / FLAG_M)))
+        shade = rng.uniform(0.86, 1.08, flags)
+        tone = cv2.resize(shade, (width, height), interpolation=cv2.INTER_NEAREST)
+        sheet.darken(tone.astype(np.float32))
+        for y in np.arange(FLAG_M, size_m[1] - 0.1, FLAG_M) * scale:
+            sheet.crease((0, y), (width, y), 0.5, 2)
+    return pixels
 
 
 def paint_steel(size_m: tuple[float, float], px_per_m: float, rng: np.random.Generator) -> Image:

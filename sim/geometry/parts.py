@@ -16,7 +16,7 @@ from airground.io.input_files import TEXT_LIMIT, read_text
 
 Kind = Literal[
     "ground", "wall", "box", "rock", "stone", "plant",
-    "post", "board", "column", "slab", "beam", "brick", "body",
+    "post", "board", "column", "slab", "beam", "brick", "body", "pavement", "front",
 ]  # fmt: skip
 KINDS: tuple[Kind, ...] = get_args(Kind)
 """Class ids are places in this tuple, counted from 1; 0 is nothing. New kinds go to the end."""

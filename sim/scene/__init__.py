@@ -11,7 +11,7 @@ from sim.scene.room import Room
 from sim.scene.rubble import Rubble
 from sim.scene.scene import Scene
 from sim.scene.terrain import Terrain
-from sim.scene.things import Debris, Shelves
+from sim.scene.things import Debris, Shelves, Street
 
 __all__ = [
     "MAX_HEAP_HEIGHT_M",
@@ -24,6 +24,7 @@ __all__ = [
     "Rubble",
     "Scene",
     "Shelves",
+    "Street",
     "Terrain",
     "load_scene",
     "parse_scene",

@@ -18,7 +18,7 @@ from sim.scene.room import Room
 from sim.scene.rubble import Rubble
 from sim.scene.scene import Scene
 from sim.scene.terrain import Terrain
-from sim.scene.things import Debris, Shelves
+from sim.scene.things import Debris, Shelves, Street
 
 
 def scene_names() -> list[str]:
@@ -88,6 +88,7 @@ def _known_keys(location: tuple[Any, ...]) -> list[str]:
         "terrain": Terrain,
         "bodies": Body,
         "shelves": Shelves,
+        "street": Street,
         "debris": Debris,
         "mav": MavPath,
         "ground": GroundPath,

@@ -14,5 +14,5 @@ class Room(Part):
     """Extent of the floor along x and y, centred on the origin [m]."""
     wall_height_m: NonNegative = 3.0
     """Height of the four walls; 0 leaves them out [m]."""
-    floor: Literal["concrete", "plain", "printed"] = "concrete"
-    """Worn concrete, a plain covering of one colour, or a flat print full of texture."""
+    floor: Literal["concrete", "plain", "printed", "asphalt"] = "concrete"
+    """Worn concrete, a plain covering of one colour, a flat print full of texture, or a road."""

@@ -13,13 +13,13 @@ from sim.scene.paths import GroundPath, MavPath
 from sim.scene.room import Room
 from sim.scene.rubble import Rubble
 from sim.scene.terrain import Terrain
-from sim.scene.things import Debris, Shelves
+from sim.scene.things import Debris, Shelves, Street
 
 PARTS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "rubble": (("rubble",), ()),
     "terrain": (("terrain",), ()),
     "flat": ((), ()),
-    "built": ((), ("rubble", "shelves", "debris")),
+    "built": ((), ("rubble", "shelves", "debris", "street")),
 }
 """Tables that each kind of scene needs, and others that it may have."""
 FLIGHT_ABOVE_M = 0.4
@@ -50,6 +50,7 @@ class Scene(Part):
     terrain: Terrain | None = None
     shelves: Shelves | None = None
     debris: Debris | None = None
+    street: Street | None = None
     bodies: tuple[Body, ...] = ()
     """Bodies that move while the robots look."""
     mav: MavPath
@@ -72,7 +73,7 @@ class Scene(Part):
     @model_validator(mode="after")
     def _parts_fit(self) -> Scene:
         needed, allowed = PARTS[self.kind]
-        for part in ("rubble", "terrain", "shelves", "debris"):
+        for part in ("rubble", "terrain", "shelves", "debris", "street"):
             present = getattr(self, part) is not None
             if present and part not in needed + allowed:
                 raise ValueError(f"kind = '{self.kind}' has no use for the [{part}] table")
@@ -107,5 +108,13 @@ class Scene(Part):
                     f"mav.height_m = {self.mav.height_m} must be at least {FLIGHT_ABOVE_M} above "
                     f"the top of [{name}], {top_m:g}"
                 )
+        if self.street is not None:
+            road_m = self.room.size_m[1] - 2 * self.street.pavement_m
+            for name, part in (("rubble", self.rubble), ("debris", self.debris)):
+                if part is not None and part.area_m[1] > road_m:
+                    raise ValueError(
+                        f"{name}.area_m[1] = {part.area_m[1]} must be at most {road_m:g}, the "
+                        "width of the road"
+                    )
         if self.rubble is not None and self.rubble.changed > 0:
             raise ValueError("rubble.changed must be 0 in a scene of kind 'built'")

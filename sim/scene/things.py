@@ -1,4 +1,4 @@
-"""What people have put on a floor: racks of shelves, and the debris of a building."""
+"""What people have put on a floor: racks of shelves, the debris of a building, a street."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from sim.scene.part import Fraction, Part, Positive
+from sim.scene.part import Fraction, NonNegative, Part, Positive
 
 Count = Annotated[int, Field(ge=0, le=200)]
 Range = tuple[Positive, Positive]
@@ -68,3 +68,14 @@ class Debris(Part):
     """Nothing comes closer to the ground robot's path than this [m]."""
     height_m: Annotated[float, Field(ge=0.5, le=4)] = 1.6
     """Nothing is higher than this [m]."""
+
+
+class Street(Part):
+    """A road along x between pavements and houses."""
+
+    pavement_m: Positive = 3.0
+    """Width of the pavement on either side [m]."""
+    kerb_m: Annotated[float, Field(gt=0, le=0.3)] = 0.12
+    """Height of the pavements above the road [m]."""
+    houses_m: NonNegative = 8.0
+    """Height of the highest houses, whose fronts end the floor; 0 leaves them out [m]."""

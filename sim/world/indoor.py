@@ -14,6 +14,7 @@ from sim.geometry.box import Box
 from sim.geometry.debris import drop_debris
 from sim.geometry.rubble import make_heap
 from sim.geometry.shelves import stand_shelves
+from sim.geometry.street import lay_street
 from sim.scene import Scene
 
 HEAPED = "box_"
@@ -21,7 +22,7 @@ HEAPED = "box_"
 
 
 def make_things(scene: Scene, rng: np.random.Generator) -> tuple[Box, ...]:
-    """All cuboids of a scene: boxes of the heap, then racks, then debris.
+    """All cuboids of a scene: boxes of the heap, then racks, debris, and the street.
 
     Debris falls on and beside racks, boxes on and beside both.
 
@@ -29,8 +30,9 @@ def make_things(scene: Scene, rng: np.random.Generator) -> tuple[Box, ...]:
         InputError: They do not fit.
     """
     shelves = stand_shelves(scene, rng)
+    street = lay_street(scene, rng)
     built = (*shelves, *drop_debris(scene, rng, shelves))
-    return (*make_heap(scene, rng, built), *built)
+    return (*make_heap(scene, rng, built), *built, *street)
 
 
 def add_box_pictures(

@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.appearance.bake_light import LightBaker
-from sim.appearance.floor import paint_concrete, paint_plain, paint_plaster, paint_print
+from sim.appearance.floor import (
+    paint_asphalt,
+    paint_concrete,
+    paint_plain,
+    paint_plaster,
+    paint_print,
+)
 from sim.appearance.pictures import add_picture
 from sim.appearance.sheet import faded, light_up
 from sim.geometry.noise import Image
@@ -17,10 +23,19 @@ from sim.geometry.surface import Mesh, join, rectangle_mesh
 from sim.scene import Room
 
 FLOOR_PX_PER_M = 480.0
+MOST_FLOOR_PX = 24e6
+"""Pixels of the picture of a larger floor, which is coarser; that of 10 x 10 m has 23 million."""
 WALL_PX_PER_M = 300.0
 FLOOR_LIGHT_CELL_M = 0.025
+MOST_LIGHT_CELLS = 200_000
+"""On the floor: a larger one has larger cells."""
 WALL_LIGHT_CELL_M = 0.1  # no box stands close enough for its shadow to have an edge there
-PAINTED_FLOORS = {"concrete": paint_concrete, "plain": paint_plain, "printed": paint_print}
+PAINTED_FLOORS = {
+    "concrete": paint_concrete,
+    "plain": paint_plain,
+    "printed": paint_print,
+    "asphalt": paint_asphalt,
+}
 COLLISION_GROUP = 3
 """Geoms of this group collide and are never drawn."""
 
@@ -65,8 +80,11 @@ def _add_floor(
     if baker:
         paint = PAINTED_FLOORS[room.floor]
         right, up = np.array([half[0], 0, 0]), np.array([0, half[1], 0])
-        light = _light_map(baker, np.zeros(3), right, up, FLOOR_LIGHT_CELL_M)
-        pixels = faded(paint(room.size_m, FLOOR_PX_PER_M, rng), texture)
+        area_m2 = float(np.prod(room.size_m))
+        cell_m = max(FLOOR_LIGHT_CELL_M, float(np.sqrt(area_m2 / MOST_LIGHT_CELLS)))
+        light = _light_map(baker, np.zeros(3), right, up, cell_m)
+        px_per_m = min(FLOOR_PX_PER_M, float(np.sqrt(MOST_FLOOR_PX / area_m2)))
+        pixels = faded(paint(room.size_m, px_per_m, rng), texture)
         add_picture(spec, "floor", _lit(pixels, light), cube=False)
     _add_panel(spec, "floor", half, np.zeros(3), np.array([1.0, 0, 0, 0]), baker is not None)
 

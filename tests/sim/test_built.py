@@ -81,7 +81,7 @@ def test_empty_places_are_drawn_by_the_seed() -> None:
     [
         ("height_m = 2.4", "height_m = 1.5", r"mav\.height_m = 1\.5 must be at least 0\.4 above"),
         ("[shelves]\nrows = 2\nbays = 3\nperiod_m = [1.2, 1.8]\n", "",
-         r"kind = 'built' needs one of the tables rubble, shelves, debris"),
+         r"kind = 'built' needs one of the tables rubble, shelves, debris, street"),
         ("bays = 3", "bays = 3\nempty = 1.5", r"shelves\.empty = 1\.5"),
     ],
 )  # fmt: skip
