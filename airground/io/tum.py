@@ -11,7 +11,7 @@ import numpy as np
 
 from airground.core.arrays import I64
 from airground.core.messages import ImuSamples
-from airground.core.se3 import SE3
+from airground.core.se3 import FARTHEST_M, SE3
 from airground.core.trajectory import Trajectory
 from airground.errors import RecordingError
 from airground.io.euroc import check_stamps, read_lines
@@ -56,8 +56,11 @@ def read_tum(path: Path | str) -> Trajectory:
             values = np.array([float(field) for field in fields[1:]])
         except ValueError as error:
             raise RecordingError(f"{path}:{number}: {error}") from None
-        if not np.isfinite(values).all():
-            raise RecordingError(f"{path}:{number}: the pose at {fields[0]} s is not finite")
+        if not (np.abs(values) < FARTHEST_M).all():
+            raise RecordingError(
+                f"{path}:{number}: the pose at {fields[0]} s is not finite, or beyond "
+                f"{FARTHEST_M:g} m"
+            )
         if abs(math.hypot(*values[3:]) - 1) > 1e-2:
             raise RecordingError(
                 f"{path}:{number}: the quaternion (qx qy qz qw) must have length 1"

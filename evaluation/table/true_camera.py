@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from airground.core.cloud import Source
-from airground.core.se3 import SE3
+from airground.core.se3 import FARTHEST_M, SE3
 from airground.core.trajectory import Trajectory
 from airground.errors import RecordingError
 from airground.io.euroc import read_lines
@@ -85,6 +85,8 @@ def read_euroc_poses(path: Path) -> Trajectory:
         values = values.reshape(-1, EUROC_COLUMNS - 1)
     except (ValueError, OverflowError) as error:
         raise RecordingError(f"{path}: expected stamp, x, y, z, qw, qx, qy, qz: {error}") from None
+    if not (np.abs(values) < FARTHEST_M).all():
+        raise RecordingError(f"{path}: a pose is not finite, or beyond {FARTHEST_M:g} m")
     quaternions = values[:, 3:]
     with np.errstate(over="ignore"):
         lengths = np.linalg.norm(quaternions, axis=1)
