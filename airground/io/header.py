@@ -34,6 +34,7 @@ class Header(Table):
         schema_version: Version of the recording's layout (key `schema`).
         scene, seed, flight: Name of the scene, seed of the heap, and number of the flight.
         sensors: Name of the sensor preset.
+        dials: What was turned away from the scene's file and the preset, by name; None for nothing.
         duration_s: Length of the recording [s].
         frames: Numbers of images.
         calibration: Nominal calibration of the sensors.
@@ -45,6 +46,7 @@ class Header(Table):
     seed: int
     flight: int
     sensors: str
+    dials: dict[str, float] | None = None
     duration_s: Annotated[float, Field(gt=0)]
     frames: FrameCounts
     calibration: CalibrationTable
@@ -73,7 +75,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 def write_toml(path: Path, table: Table) -> None:
     """Write a table; the same values give the same bytes."""
-    text = tomli_w.dumps(table.model_dump(by_alias=True, mode="json"))
+    text = tomli_w.dumps(table.model_dump(by_alias=True, mode="json", exclude_none=True))
     compact = _NUMBERS.sub(lambda match: f"[{' '.join(match[1].split()).rstrip(',')}]", text)
     path.write_text(compact, encoding="utf-8")
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
-from tyro.conf import Positional, UseAppendAction
+from tyro.conf import Positional, UseAppendAction, arg
 
 from airground.errors import InputError
 from evaluation.commands.folder_options import FolderOptions
@@ -52,6 +52,8 @@ class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
     """length of the recording [s]"""
     flight: Annotated[int, Shown("N")] = 0
     """flight over the same heap: other waypoints, other noise"""
+    dials: Annotated[UseAppendAction[tuple[str, ...]], arg(name="dial"), Shown("NAME=VALUE")] = ()
+    """turn scene or sensors (docs/sweep.md), as in sensors.readout_ms=20; repeatable"""
 
     def main(self) -> None:
         if self.duration_s is not None:
@@ -62,6 +64,8 @@ class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
             self._make_dataset(self.seeds)
 
     def _record_one(self) -> None:
+        from airground.config import Config
+        from evaluation.measure.plans.dials import Subject, parse_dials, turned
         from evaluation.setup.output import check_free
         from evaluation.setup.progress import announce, step
         from sim.recording.recorder import record
@@ -70,7 +74,10 @@ class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
 
         if len(self.scenes) != 1 or self.split or self.jobs != 1:
             raise InputError("several scenes, --split and --jobs: only with --seeds")
-        scene, seed = load_scene(self.scenes[0]), self.checked_seed()
+        dials = parse_dials(self.dials)
+        asked = Subject(load_scene(self.scenes[0]), sensor_preset(self.sensors), Config())
+        subject, seed = turned(asked, dials), self.checked_seed()
+        scene = subject.scene
         flight = int(in_range("--flight", self.flight))
         check_free(self.out)
         seconds = self.duration_s or scene.duration_s
@@ -80,11 +87,12 @@ class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
             record(
                 scene,
                 seed,
-                sensor_preset(self.sensors),
+                subject.sensors,
                 self.out,
                 self.duration_s,
                 self.workers(),
                 flight=flight,
+                dials=dials,
                 progress=rendering.move_to,
             )
 
@@ -94,8 +102,8 @@ class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
         from evaluation.setup.progress import announce
         from sim.scene import load_scene
 
-        if not self.scenes or self.seed or self.flight:
-            raise InputError("--seeds: with at least one SCENE, and without --seed and --flight")
+        if not self.scenes or self.seed or self.flight or self.dials:
+            raise InputError("--seeds: with at least one SCENE, no --seed, --flight or --dial")
         plan = plan_dataset(
             self.scenes, parse_seeds(seeds), parse_split(self.split), self.sensors, self.duration_s
         )

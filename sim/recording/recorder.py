@@ -7,7 +7,7 @@ import os
 import shutil
 import tempfile
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -57,13 +57,17 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class Flight:
-    """What a recording is made from; `record` explains the fields (`sensors` is its preset)."""
+    """What a recording is made from; `record` explains the fields (`sensors` is its preset).
+
+    `dials` are stated in the header; scene and preset have been turned already.
+    """
 
     scene: Scene
     seed: int
     flight: int
     sensors: SensorPreset
     duration_s: float | None = None
+    dials: Mapping[str, float] | None = None
 
 
 def record(
@@ -75,6 +79,7 @@ def record(
     workers: int | None = None,
     *,
     flight: int = 0,
+    dials: Mapping[str, float] | None = None,
     progress: Progress | None = None,
 ) -> Path:
     """Record one flight over a scene; the same arguments give the same bytes.
@@ -87,6 +92,7 @@ def record(
         duration_s: Cuts the recording short; the scene's own length if None.
         workers: Number of processes that render; one per usable core if None.
         flight: Number of the flight over the same heap.
+        dials: What has been turned in scene and preset, for the header.
         progress: Consumer of the rendering's progress.
 
     Raises:
@@ -100,7 +106,7 @@ def record(
     out = Path(out)
     if out.exists():
         raise InputError(f"{out}: already exists; name a folder that does not")
-    what = Flight(scene, seed, flight, preset, duration_s)
+    what = Flight(scene, seed, flight, preset, duration_s, dials)
     try:
         with partial_folder(out) as temporary:
             header, plan = write_all_but_images(temporary, what)
@@ -205,6 +211,7 @@ def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan]
         seed=flight.seed,
         flight=flight.flight,
         sensors=preset.name,
+        dials=dict(flight.dials) if flight.dials else None,
         duration_s=motion.duration_s,
         frames=FrameCounts(**{robot: len(left.stamps_ns) for robot, left in frames.items()}),
         calibration=nominal,

@@ -278,6 +278,16 @@ def _with_faults(preset: SensorPreset, *faults: Fault) -> SensorPreset:
     return replace(preset, faults=(*preset.faults, *lasting))
 
 
+def with_fisheye(preset: SensorPreset, factor: float) -> SensorPreset:
+    """The preset with fisheyes of 150 deg of `factor` times the measured distortion; 0 is an
+    ideal equidistant lens."""
+    return replace(
+        preset,
+        mav_optics=replace(preset.mav_optics, lens="equidistant", distortion=factor),
+        ground_optics=replace(preset.ground_optics, lens="equidistant", distortion=factor),
+    )
+
+
 def with_heading_error(preset: SensorPreset, deviation_deg: float) -> SensorPreset:
     """The preset with headings of each robot's magnetometer that are off by this deviation.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +15,7 @@ from sim.sensors.presets import (
     SensorPreset,
     with_distortion,
     with_dropped,
+    with_fisheye,
     with_heading_error,
     with_imu_gap,
     with_noise,
@@ -153,6 +154,12 @@ DIALS = (
         lambda subject, value: replace(subject, sensors=with_imu_gap(subject.sensors, value)),
     ),
     Dial(
+        "sensors.fisheye", "", 0.0, 1.5,
+        "fisheyes of 150° on both cameras, with this factor of a measured distortion; 0 is an "
+        "ideal equidistant lens",
+        lambda subject, value: replace(subject, sensors=with_fisheye(subject.sensors, value)),
+    ),
+    Dial(
         "sensors.heading_error_deg", "deg", 0.0, 45.0,
         "standard deviation of each robot's magnetic heading, which replaces the preset's",
         lambda subject, value: replace(subject, sensors=with_heading_error(subject.sensors, value)),
@@ -169,7 +176,7 @@ def dial_named(name: str) -> Dial | None:
     """
     known = {dial.name: dial for dial in DIALS}
     if name not in known and name.startswith(("scene.", "sensors.")):
-        raise InputError(f"--vary {name}: unknown dial; known: {', '.join(known)}")
+        raise InputError(f"{name}: unknown dial; known: {', '.join(known)}")
     return known.get(name)
 
 
@@ -177,6 +184,23 @@ def unit_of(name: str) -> str:
     """The unit of a dial's values, as far as it has one."""
     dial = dial_named(name)
     return dial.unit if dial is not None else ""
+
+
+def parse_dials(words: Sequence[str]) -> dict[str, float]:
+    """What `NAME=VALUE` words say; InputError names one that is no dial, or comes twice."""
+    point: dict[str, float] = {}
+    for word in words:
+        name, equals, text = (part.strip() for part in word.partition("="))
+        if not equals or dial_named(name) is None:
+            known = ", ".join(dial.name for dial in DIALS)
+            raise InputError(f"--dial {word}: expected NAME=VALUE; dials: {known}")
+        if name in point:
+            raise InputError(f"--dial {name}: given twice")
+        try:
+            point[name] = float(text)
+        except ValueError:
+            raise InputError(f"--dial {word}: {text!r} is no number") from None
+    return point
 
 
 def turned(subject: Subject, point: Point) -> Subject:
@@ -198,11 +222,11 @@ def _turned(subject: Subject, name: str, value: Value) -> Subject:
         origin = f"--vary {name}"
         return replace(subject, config=with_value(subject.config, section, key, value, origin))
     if isinstance(value, bool) or not isinstance(value, int | float) or value != value:
-        raise InputError(f"--vary {name}: {value!r} is no number")
+        raise InputError(f"{name}: {value!r} is no number")
     if not dial.low <= value <= dial.high:
         unit = f" {dial.unit}" if dial.unit else ""
         raise InputError(
-            f"--vary {name}: {value!r:.20} is out of its range, {dial.low:g} to {dial.high:g}{unit}"
+            f"{name}: {value!r:.20} is out of its range, {dial.low:g} to {dial.high:g}{unit}"
         )
     return dial.turn(subject, float(value))
 
@@ -210,7 +234,7 @@ def _turned(subject: Subject, name: str, value: Value) -> Subject:
 def _part(subject: Subject, part: str, **change: float) -> Subject:
     table = getattr(subject.scene, part)
     if table is None:
-        raise InputError(f"--vary: scene '{subject.scene.name}' has no [{part}] to change")
+        raise InputError(f"scene '{subject.scene.name}' has no [{part}] to change")
     return _scene(subject, **{part: table.model_copy(update=change)})
 
 

@@ -168,7 +168,7 @@ def test_the_data_sheet_says_where_the_robots_see_two_worlds(small: Path) -> Non
     [
         (["tiny", "flat"], "only with --seeds"),
         (["tiny", "--split", "test=0.2"], "only with --seeds"),
-        (["tiny", "--seeds", "0-1", "--seed", "3"], "without --seed and --flight"),
+        (["tiny", "--seeds", "0-1", "--seed", "3"], "no --seed, --flight or --dial"),
         (["tiny", "tiny", "--seeds", "0"], "two scenes have the same name"),
         (["tiny", "--seeds", "0", "--jobs", "0"], "--jobs 0: must be from 1"),
         (["no_such_scene", "--seeds", "0"], "no_such_scene"),
