@@ -20,8 +20,12 @@ STONE_M = (0.02, 0.09)
 """Smallest and largest diameter: from coarse gravel to cobbles (ISO 14688) [m]."""
 LEAF_M = (0.08, 0.2)
 """Shortest and longest leaf of a plant, as of plantain, dandelion or broad grass [m]."""
+BLADE_M = (0.12, 0.35)
+"""Shortest and longest blade of a tuft, as of a meadow before it is mown [m]."""
+BLADE_WIDTH_M = (0.004, 0.009)
+"""Narrowest and widest blade [m]."""
 LEAVES = 8
-"""Leaves of a plant."""
+"""Leaves of a plant, and blades of a tuft."""
 STONE_NODES = (4, 4)
 LEAF_NODES = (2, 4)
 """Rows and columns of nodes of a patch: as few as bend, for there are ten thousands."""
@@ -35,8 +39,8 @@ class GroundCover:
 
     Attributes:
         stones: (S, *STONE_NODES, 3) nodes of the visible part of each stone, in `world` [m].
-        leaves: (L, *LEAF_NODES, 3) nodes of the upper side of each leaf, from its root to its tip,
-            in `world` [m].
+        leaves: (L, *LEAF_NODES, 3) nodes of the upper side of each leaf or blade, from its root to
+            its tip, in `world` [m].
     """
 
     stones: NDArray[np.float64]
@@ -60,7 +64,7 @@ class GroundCover:
         return join(_grids(patches) for patches in self.patches())
 
     def parts(self) -> list[Part]:
-        """Stones and plants, in the order of the mesh; a plant is all its leaves."""
+        """Stones and plants (also tufts) with all their leaves, in the order of the mesh."""
         stone, leaf = (
             2 * (rows - 1) * (columns - 1) for rows, columns in (STONE_NODES, LEAF_NODES)
         )
@@ -75,12 +79,13 @@ class GroundCover:
 def grow_cover(
     terrain: Terrain, ground: HeightField, rocks: Sequence[Mesh], rng: np.random.Generator
 ) -> GroundCover:
-    """Scatter the stones of `terrain` over the ground, and its plants over ground and rocks."""
+    """Scatter the stones of `terrain` over the ground, plants and grass over ground and rocks."""
     area = np.minimum(np.array(terrain.area_m) + 2 * MARGIN_M, ground.size_m - 0.2)
     stones = _stones(round(terrain.stones_per_m2 * area.prod()), area, ground, rng)
     surface = join([ground.mesh(), *rocks])
     leaves = _leaves(round(terrain.plants_per_m2 * area.prod()), area, surface, rng)
-    return GroundCover(stones, leaves)
+    blades = _blades(round(terrain.grass_per_m2 * area.prod()), area, surface, rng)
+    return GroundCover(stones, np.concatenate([leaves, blades]))
 
 
 def patch_normals(patches: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -138,6 +143,27 @@ def _leaves(
     up = rise * along - droop * along**2
     nodes = np.stack(np.broadcast_arrays(along, side, up), axis=-1)
     nodes /= np.sqrt(1 + rise**2)[..., None]  # lengths count along the slope
+    angles = rng.uniform(0, 2 * np.pi, count)
+    heights = _heights(surface, places)
+    return _placed(nodes * lengths[:, None, None, None], angles, places, heights)
+
+
+def _blades(
+    tufts: int, area: NDArray, surface: Mesh, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Narrow blades that rise from about one place of a surface and bend over at the tip."""
+    count = tufts * LEAVES
+    places = np.repeat(rng.uniform(-area / 2, area / 2, (tufts, 2)), LEAVES, axis=0)
+    places += rng.normal(0, 0.015, (count, 2))
+    lengths = np.repeat(rng.uniform(*BLADE_M, tufts), LEAVES) * rng.uniform(0.5, 1.0, count)
+    lean = np.tan(np.radians(rng.uniform(5, 42, count)))[:, None, None]
+    bend = rng.uniform(0.1, 0.4, count)[:, None, None]
+    width = (rng.uniform(*BLADE_WIDTH_M, count) / lengths)[:, None, None]
+    along, across = np.meshgrid(np.linspace(0, 1, LEAF_NODES[1]), np.linspace(1, -1, LEAF_NODES[0]))
+    out = lean * along + bend * along**2
+    side = width * across * (1 - 0.9 * along**2)
+    nodes = np.stack(np.broadcast_arrays(out, side, along - 0.5 * bend * along**2), axis=-1)
+    nodes /= np.sqrt(1 + (lean + bend) ** 2)[..., None]
     angles = rng.uniform(0, 2 * np.pi, count)
     heights = _heights(surface, places)
     return _placed(nodes * lengths[:, None, None, None], angles, places, heights)

@@ -28,5 +28,12 @@ class Terrain(Part):
     """No rock comes closer to the ground robot's path than this [m]."""
     stones_per_m2: Annotated[float, Field(ge=0, le=400)] = 0.0
     """Small stones of 2 to 9 cm, which stand out of the ground [1/m^2]."""
+    grass_per_m2: Annotated[float, Field(ge=0, le=120)] = 0.0
+    """Tufts of grass on ground and rocks, each of eight blades of 12 to 35 cm [1/m^2]."""
     plants_per_m2: Annotated[float, Field(ge=0, le=60)] = 0.0
     """Low plants on ground and rocks, each a rosette of leaves of 8 to 20 cm [1/m^2]."""
+
+    @property
+    def covered(self) -> bool:
+        """Whether stones, plants or grass stand on the ground."""
+        return self.stones_per_m2 + self.plants_per_m2 + self.grass_per_m2 > 0

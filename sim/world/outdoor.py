@@ -42,7 +42,7 @@ def add_ground(
         unlit = faded(painted, scene.texture)
         picture = np.empty(unlit.shape, np.uint8)
         terrain = scene.terrain
-        covered = terrain is not None and terrain.stones_per_m2 + terrain.plants_per_m2 > 0
+        covered = terrain is not None and terrain.covered
         cell_m = COVER_LIGHT_CELL_M if covered else LIGHT_CELL_M
         light_up(unlit, _ground_light(ground, baker, cell_m), picture)
         add_picture(spec, "ground", picture, cube=False)

@@ -52,6 +52,32 @@ def test_stones_and_leaves_face_up_and_undersides_down() -> None:
     assert (patch_normals(undersides)[..., 2] < 0).all()
 
 
+def test_grass_stands_up_in_narrow_blades_and_counts_as_plants() -> None:
+    terrain = Terrain(area_m=(1.0, 1.0), grass_per_m2=50)
+    cover = grow_cover(terrain, flat_ground(), [], np.random.default_rng(0))
+    assert len(cover.leaves) == 200 * LEAVES
+    roots, tips = cover.leaves[:, :, 0].mean(1), cover.leaves[:, :, -1].mean(1)
+    np.testing.assert_allclose(roots[:, 2], 0, atol=1e-6)
+    assert 0.03 < tips[:, 2].min() < tips[:, 2].max() < 0.35
+    rise = (tips - roots)[:, 2] / np.linalg.norm((tips - roots)[:, :2], axis=1)
+    assert np.median(rise) > 1
+    widths = np.linalg.norm(cover.leaves[:, 0] - cover.leaves[:, 1], axis=-1)
+    assert 0.0005 < widths.min() < widths.max() < 0.02
+    assert len({part.name for part in cover.parts()}) == 200
+
+
+def test_grass_leaves_stones_and_plants_as_they_are() -> None:
+    terrain = Terrain(area_m=(1.0, 1.0), stones_per_m2=20, plants_per_m2=5)
+    grown = terrain.model_copy(update={"grass_per_m2": 10.0})
+    plain, grassy = (
+        grow_cover(one, flat_ground(), [], np.random.default_rng(1)) for one in (terrain, grown)
+    )
+    np.testing.assert_array_equal(plain.stones, grassy.stones)
+    np.testing.assert_array_equal(plain.leaves, grassy.leaves[: len(plain.leaves)])
+    assert grown.covered
+    assert not Terrain().covered
+
+
 def test_plants_grow_on_rocks_and_stones_lie_beneath_them() -> None:
     terrain = Terrain(area_m=(1.0, 1.0), stones_per_m2=50, plants_per_m2=50)
     table = rectangle_mesh(np.array([-2.0, -2, 0.5]), np.array([4.0, 0, 0]), np.array([0, 4.0, 0]))

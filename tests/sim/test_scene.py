@@ -10,8 +10,8 @@ from sim.world.world import build_world
 
 PAPER = ["paper_a", "paper_b", "paper_c", "paper_outdoor"]
 SHIPPED = [
-    "collapsed", "flat", "indoor_a", "indoor_b", "indoor_c", "outdoor", *PAPER, "street", "tiny",
-    "warehouse",
+    "collapsed", "flat", "indoor_a", "indoor_b", "indoor_c", "meadow", "outdoor", *PAPER, "street",
+    "tiny", "warehouse",
 ]  # fmt: skip
 
 SMALL = """
