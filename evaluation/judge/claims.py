@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from pydantic import Field
 from scipy.stats import chi2, spearmanr
 
 from evaluation.judge import samples
@@ -76,6 +78,15 @@ def _by_case(
     }
     asked = {name: claims for name, claims in made.items() if claims.accepted.total}
     return asked | {ALL: Claims.sum(list(asked.values()))} if asked else {}
+
+
+def refusals(table: ResultTable, stage: str, metric: str) -> dict[str, int]:
+    """How often a stage refused for which kind of reason (of one condition), the commonest first.
+    The kind is what stands before the colon; equally common ones are in order of their names."""
+    rows = table.rows(stage, metric)
+    reasons = rows.loc[rows["value"] == 0, "note"].astype(str)
+    counts = Counter(reason.partition(":")[0] for reason in reasons if reason)
+    return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
 
 
 METRIC = "squared_mahalanobis"
@@ -172,10 +183,13 @@ class ClaimsPart(Part):
 
 
 class ClaimsSummary(Part):
-    """By case: "found", "no_structure", "no_overlap", "wrong_map", and "all" of them."""
+    """By case: "found", "no_structure", "no_overlap", "wrong_map", and "all" of them.
+    Refusals are counted by the kind of their reason where there is a place to find."""
 
     localization: dict[str, ClaimsPart]
     refinement: dict[str, ClaimsPart]
+    localization_refusals: dict[str, Count] = Field(default_factory=dict)
+    refinement_refusals: dict[str, Count] = Field(default_factory=dict)
 
 
 class CalibrationPart(Part):
@@ -219,8 +233,12 @@ def claims_summary(table: ResultTable) -> ClaimsSummary:
             for case, made in claims.items()
         }
 
+    places = table.scored()
     return ClaimsSummary(
-        localization=parts(localization_claims(table)), refinement=parts(refinement_claims(table))
+        localization=parts(localization_claims(table)),
+        refinement=parts(refinement_claims(table)),
+        localization_refusals=refusals(places, "localization", "converged"),
+        refinement_refusals=refusals(places, "refinement", "accepted"),
     )
 
 

@@ -70,13 +70,24 @@ def _at(shares: list[float], iteration: int) -> float | None:
 
 def _claims(summary: Summary) -> list[tuple[str, str, str]]:
     """Over all cases, those without a place to find included."""
-    every = summary.claims.localization.get(ALL) if summary.claims is not None else None
-    if every is None:
+    claims = summary.claims
+    every = claims.localization.get(ALL) if claims is not None else None
+    if claims is None or every is None:
         return []
     return [
         ("localizations that claim a place", percent(every.accepted.share), MISSING),
         ("wrong among them, all cases", percent(every.wrong.share), MISSING),
+        *_commonest("localizations", claims.localization_refusals),
+        *_commonest("refinements", claims.refinement_refusals),
     ]
+
+
+def _commonest(what: str, refusals: dict[str, int]) -> list[tuple[str, str, str]]:
+    """The commonest reason of a stage's refusals; nothing without any."""
+    if not refusals:
+        return []
+    reason, count = next(iter(refusals.items()))
+    return [(f"{what} refused, mostly", f"{reason}: {count} of {sum(refusals.values())}", MISSING)]
 
 
 def _poses(robot: str, poses: SlamRobot) -> list[tuple[str, str, str]]:

@@ -168,6 +168,26 @@ def test_the_screen_shows_our_numbers_beside_the_papers(table: ResultTable) -> N
     assert "76 mm" in text
 
 
+def test_the_screen_gives_the_commonest_reason_of_refusals(table: ResultTable) -> None:
+    frame = table.frame.copy()
+    for stage, metric, notes in (
+        ("localization", "converged", ["split: 0.3 m", "split: 0.4 m", "flat: 2 mm"]),
+        ("refinement", "accepted", ["no overlap: 3 %"]),
+    ):
+        rows = frame.index[(frame["stage"] == stage) & (frame["metric"] == metric)]
+        frame.loc[rows, ["value", "note"]] = [1.0, ""]
+        for row, note in zip(rows, notes, strict=False):
+            frame.loc[row, ["value", "note"]] = [0.0, note]
+    summary = build_summary(ResultTable(frame), BEST, RUN)
+    assert summary.claims is not None
+    assert summary.claims.localization_refusals == {"split": 2, "flat": 1}
+    console = Console(width=100, record=True, file=None, quiet=False)
+    with console.capture() as captured:
+        print_summary(summary, console)
+    assert "split: 2 of 3" in captured.get()
+    assert "no overlap: 1 of 1" in captured.get()
+
+
 def test_an_unknown_preset_is_refused() -> None:
     table = ResultTable(make_table(conditions=(BEST,)).frame.assign(preset="odd"))
     with pytest.raises(InputError, match="unknown preset 'odd'"):
