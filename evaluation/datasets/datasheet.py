@@ -99,7 +99,7 @@ def _scenes(scenes: Sequence[Scene]) -> list[str]:
 
 
 def _two_worlds(scenes: Sequence[Scene]) -> list[str]:
-    """A line for each scene in which the robots do not see the same world."""
+    """A line for each scene in which the robots do not see the same world at rest."""
     lines = []
     for scene in scenes:
         share = scene.rubble.changed if scene.rubble else 0.0
@@ -110,6 +110,11 @@ def _two_worlds(scenes: Sequence[Scene]) -> list[str]:
             )
         if scene.flight_light is not None:
             lines.append(f"- `{scene.name}`: the MAV sees it in another light.")
+        if scene.bodies:
+            lines.append(
+                f"- `{scene.name}`: bodies that move while the robots look: {len(scene.bodies)} "
+                "(`truth/bodies.csv`)."
+            )
         if scene.ground.lamp > 0:
             lines.append(f"- `{scene.name}`: the ground robot carries a lamp.")
     return [*lines, ""] if lines else []

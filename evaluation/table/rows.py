@@ -16,7 +16,7 @@ from evaluation.setup.condition import Condition
 
 CONTROL_SCENES = frozenset({"flat"})
 """Scenes without structure, in which the right answer is to claim nothing."""
-OUTDOOR_SCENES = frozenset({"outdoor", "paper_outdoor"})
+OUTDOOR_SCENES = frozenset({"meadow", "outdoor", "paper_outdoor", "street"})
 UNSCORED_SCENES = CONTROL_SCENES | {"paper_outdoor"}
 """Scenes that count in no accuracy: controls, and the twin of the paper's outdoor dataset, for
 which the paper has pictures and no truth."""
