@@ -4,77 +4,106 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
-from typing import Any
+from contextlib import AbstractContextManager, nullcontext
+from pathlib import Path
+from typing import Any, TypeVar
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from airground.errors import AirgroundError
-from sim.interrupts import deaf_children, end_children, end_with_parent
+from sim.interrupts import deaf_children, end_with_parent
 from sim.recording.frames import FrameMaker, FramePlan, Written
 from sim.robots.motion import ROBOTS, Robot
 
 FRAMES_PER_TASK = 8
 
+Result = TypeVar("Result")
 Task = tuple[Robot, int, int]
 """Robot, first frame, and the frame after the last."""
 
 
-def make_frames(plan: FramePlan, workers: int) -> Iterator[list[Written]]:
+class FrameWorkers:
+    """Processes that make frames. They start at once, so that they have imported all that they
+    need when the first plan is ready. A context manager; an error in it ends the processes."""
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        threads = max(len(os.sched_getaffinity(0)) // count, 1)
+        spawn = multiprocessing.get_context("spawn")
+        self._pool = ProcessPoolExecutor(count, spawn, _start_worker, (threads,))
+        others = set(multiprocessing.active_children())
+        with deaf_children():  # all processes start with the first task
+            self._pool.submit(_nothing)
+        self._processes = set(multiprocessing.active_children()) - others
+
+    def __enter__(self) -> FrameWorkers:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is not None:
+            for process in self._processes:  # their results are not needed any more
+                process.terminate()
+        self._pool.shutdown(cancel_futures=True)
+
+    def submit(self, work: Callable[..., Result], *arguments: Any) -> Future[Result]:
+        """Have one of the processes do something."""
+        return self._pool.submit(work, *arguments)
+
+    def died(self) -> AirgroundError:
+        """What to raise when a process has died."""
+        return AirgroundError(
+            "a rendering process died, perhaps for lack of memory: "
+            f"try fewer than {self.count} workers"
+        )
+
+
+def frame_workers(count: int) -> AbstractContextManager[FrameWorkers | None]:
+    """Processes for `make_frames`; none for one worker, which is this process."""
+    return nullcontext() if count == 1 else FrameWorkers(count)
+
+
+def make_frames(plan: FramePlan, pool: FrameWorkers | None) -> Iterator[list[Written]]:
     """Write every frame; yields what was written, a few frames at a time, in any order.
 
-    With one worker the frames are made in this process.
+    Args:
+        plan: Frames to make.
+        pool: Processes that make them; None is this process.
 
     Raises:
         AirgroundError: A process died, as when memory runs out.
     """
     tasks = _tasks(plan)
-    if workers == 1:
+    if pool is None:
         with FrameMaker(plan) as maker:
             for task in tasks:
                 yield _make(maker, task)
         return
-    workers = min(workers, len(tasks))
-    pool = _pool(plan, workers)
     try:
-        with deaf_children():
-            futures = [pool.submit(_work, task) for task in tasks]
+        futures = [pool.submit(_work, plan, task) for task in tasks]
         for future in as_completed(futures):
             yield future.result()
     except BrokenProcessPool:
-        raise _died(workers) from None
-    except BaseException:
-        end_children()
-        raise
-    finally:
-        pool.shutdown(cancel_futures=True)
+        raise pool.died() from None
 
 
 class FrameServer:
     """Gives a plan's frames as they are asked for, drawn a little ahead by other processes.
 
-    A context manager. Asked in order, a robot's frames come without waiting if drawing keeps up;
-    in any other order each frame is drawn when it is asked for.
+    Asked in order, a robot's frames come without waiting if drawing keeps up; in any other order
+    each frame is drawn when it is asked for.
     """
 
-    def __init__(self, plan: FramePlan, workers: int) -> None:
+    def __init__(self, plan: FramePlan, pool: FrameWorkers) -> None:
+        self._plan, self._pool = plan, pool
         self._counts = {robot: len(frames.stamps_ns) for robot, frames in plan.frames.items()}
-        self._workers = workers
-        self._pool = _pool(plan, workers)
         self._ahead: dict[Robot, dict[int, Future[Any]]] = {robot: {} for robot in ROBOTS}
-
-    def __enter__(self) -> FrameServer:
-        with deaf_children():  # all processes start with the first tasks
-            for robot in ROBOTS:
-                self._draw_ahead(robot, 0)
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._pool.shutdown(cancel_futures=True)
+        for robot in ROBOTS:
+            self._draw_ahead(robot, 0)
 
     def mav(self, index: int) -> NDArray[np.uint8]:
         """As `FrameMaker.mav`; AirgroundError if a process died."""
@@ -91,29 +120,17 @@ class FrameServer:
             self._draw_ahead(robot, index)
             return self._ahead[robot].pop(index).result()
         except BrokenProcessPool:
-            raise _died(self._workers) from None
+            raise self._pool.died() from None
 
     def _draw_ahead(self, robot: Robot, index: int) -> None:
         """Have this frame and the next ones drawn, and forget all others."""
         ahead = self._ahead[robot]
-        wanted = range(index, min(index + 2 * self._workers + 1, self._counts[robot]))
+        wanted = range(index, min(index + 2 * self._pool.count + 1, self._counts[robot]))
         for other in [k for k in ahead if k not in wanted]:
             ahead.pop(other).cancel()
         for k in wanted:
             if k not in ahead:
-                ahead[k] = self._pool.submit(_draw, robot, k)
-
-
-def _pool(plan: FramePlan, workers: int) -> ProcessPoolExecutor:
-    threads = max(len(os.sched_getaffinity(0)) // workers, 1)
-    context = multiprocessing.get_context("spawn")
-    return ProcessPoolExecutor(workers, context, _start_worker, (plan, threads))
-
-
-def _died(workers: int) -> AirgroundError:
-    return AirgroundError(
-        f"a rendering process died, perhaps for lack of memory: try fewer than {workers} workers"
-    )
+                ahead[k] = self._pool.submit(_draw, self._plan, robot, k)
 
 
 def _tasks(plan: FramePlan) -> list[Task]:
@@ -131,31 +148,34 @@ def _make(maker: FrameMaker, task: Task) -> list[Written]:
     return [written for index in range(first, end) for written in maker.make(robot, index)]
 
 
-_maker: FrameMaker | AirgroundError | None = None  # one a process
+_maker: tuple[Path, FrameMaker] | None = None  # one a process, of the plan with this recording
 
 
-def _start_worker(plan: FramePlan, threads: int) -> None:
-    global _maker
+def _start_worker(threads: int) -> None:
     end_with_parent()
-    os.environ.setdefault("LP_NUM_THREADS", str(threads))  # of Mesa's software renderer
+    # Of Mesa's software renderer, beside its caller's: one more would only wait for the other.
+    os.environ.setdefault("LP_NUM_THREADS", str(threads if threads > 1 else 0))
     cv2.setNumThreads(1)
-    try:
-        _maker = FrameMaker(plan)
-    except (AirgroundError, OSError) as error:
-        # Raised with the first task: an error here breaks the pool and prints a traceback.
-        _maker = AirgroundError(f"{plan.recording}: cannot be read: {error}")
 
 
-def _made() -> FrameMaker:
-    assert _maker is not None
-    if isinstance(_maker, AirgroundError):
-        raise _maker
-    return _maker
+def _nothing() -> None:
+    """The first task."""
 
 
-def _work(task: Task) -> list[Written]:
-    return _make(_made(), task)
+def _maker_of(plan: FramePlan) -> FrameMaker:
+    global _maker
+    if _maker is None or _maker[0] != plan.recording:
+        try:
+            _maker = plan.recording, FrameMaker(plan)
+        except OSError as error:
+            raise AirgroundError(f"{plan.recording}: cannot be read: {error}") from None
+    return _maker[1]
 
 
-def _draw(robot: Robot, index: int) -> Any:
-    return _made().mav(index) if robot == "mav" else _made().ground(index)
+def _work(plan: FramePlan, task: Task) -> list[Written]:
+    return _make(_maker_of(plan), task)
+
+
+def _draw(plan: FramePlan, robot: Robot, index: int) -> Any:
+    maker = _maker_of(plan)
+    return maker.mav(index) if robot == "mav" else maker.ground(index)

@@ -148,7 +148,7 @@ class FrameMaker:
             colour = self._expose("ground", colour, depth, time_ns, rng)
         delay_ns = self._plan.true.ground.depth.delay_ns
         if delay_ns:
-            _, depth = self._views["ground"].draw(time_ns + delay_ns)
+            depth = self._views["ground"].depth(time_ns + delay_ns)
         if self._plan.preset.depth is not None:
             depth = kinect_depth(depth, self._pixels["ground"], self._plan.preset.depth, rng)
         frames = self._plan.frames["ground"]

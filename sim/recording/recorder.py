@@ -28,7 +28,7 @@ from sim.partial_folder import partial_folder
 from sim.recording.bodies_in_view import add_bodies
 from sim.recording.carried_lamp import CarriedLamp
 from sim.recording.drone_shadow import DroneShadow
-from sim.recording.frame_pool import FrameServer, make_frames
+from sim.recording.frame_pool import FrameServer, FrameWorkers, frame_workers, make_frames
 from sim.recording.frames import FramePlan, WorldFiles
 from sim.recording.render import with_cameras
 from sim.recording.truth import write_truth
@@ -43,7 +43,7 @@ from sim.sensors.faulty_frames import FaultyFrames
 from sim.sensors.imu import measure_field, measure_imu
 from sim.sensors.miscalibration import CAMERA_RATE_HZ, MAGNETOMETER_RATE_HZ, calibrate
 from sim.sensors.presets import SensorPreset
-from sim.world.world import World, build_world, flight_world, unlit_world
+from sim.world.world import World, build_world, flight_world, painted, unlit_world
 
 # The cameras share no trigger; no exposure may reach beyond the motion.
 FIRST_IMAGE_NS: dict[Robot, int] = {"mav": 50_000_000, "ground": 55_000_000}
@@ -108,10 +108,10 @@ def record(
         raise InputError(f"{out}: already exists; name a folder that does not")
     what = Flight(scene, seed, flight, preset, duration_s, dials)
     try:
-        with partial_folder(out) as temporary:
-            header, plan = write_all_but_images(temporary, what)
-            _store_models(plan, what)
-            digests = _render(plan, workers, progress)
+        with partial_folder(out) as temporary, frame_workers(workers) as pool:
+            header, plan, plain = write_all_but_images(temporary, what)
+            store_models(plan, plain)
+            digests = _render(plan, pool, progress)
             for files in plan.world_files():
                 files.model.unlink()
                 files.edges.unlink()
@@ -134,17 +134,19 @@ def rendered(flight: Flight, workers: int) -> Iterator[Recording]:
     Raises:
         AirgroundError: One line on what was wrong.
     """
-    with tempfile.TemporaryDirectory(prefix="airground-") as folder:
+    with (
+        tempfile.TemporaryDirectory(prefix="airground-") as folder,
+        FrameWorkers(workers) as pool,
+    ):
         root = Path(folder)
         try:
-            header, plan = write_all_but_images(root, flight)
+            header, plan, plain = write_all_but_images(root, flight)
             recording_writer.finish(root, header, {})
-            _store_models(plan, flight)
+            store_models(plan, plain)
         except OSError as error:
             raise AirgroundError(f"{root}: the flight cannot be prepared there: {error}") from None
-        with FrameServer(plan, workers) as frames:
-            depth_units_per_m = header.calibration.ground.depth.units_per_m
-            yield Recording.open(folder, _DrawnImages(frames, depth_units_per_m))
+        depth_units_per_m = header.calibration.ground.depth.units_per_m
+        yield Recording.open(folder, _DrawnImages(FrameServer(plan, pool), depth_units_per_m))
 
 
 @dataclass(frozen=True)
@@ -162,10 +164,11 @@ class _DrawnImages:
         return colour, metric_depth(depth_units, self.depth_units_per_m)
 
 
-def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan]:
+def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan, World]:
     """Simulate a flight and write its samples, lists and truth into an empty folder.
 
-    Returns the header, to be written last, and the plan of the images, which needs `_store_models`.
+    Returns the header, to be written last; the plan of the images, which needs `store_models`;
+    and the ground robot's world, without pictures.
     """
     scene, preset, seeds = flight.scene, flight.sensors, (flight.seed, flight.flight)
     motion_rng, calibration_rng, mav_rng, ground_rng = np.random.default_rng(seeds).spawn(4)
@@ -217,7 +220,7 @@ def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan]
         calibration=nominal,
         digests={},
     )
-    return header, plan
+    return header, plan, world
 
 
 def _world_files(root: Path, one: bool) -> dict[Robot, WorldFiles]:
@@ -231,9 +234,9 @@ def _unlit_files(root: Path) -> WorldFiles:
     return WorldFiles(root / "world_unlit.mjb", root / "edges_unlit.npz")
 
 
-def _store_models(plan: FramePlan, flight: Flight) -> None:
-    """Build the worlds with their pictures once for all processes: they take long to make."""
-    drive = build_world(flight.scene, flight.seed)
+def store_models(plan: FramePlan, plain: World) -> None:
+    """Paint the worlds once for all processes: pictures take long to make."""
+    drive = painted(plain)
     _store_model(plan, plan.worlds["ground"], drive)
     if plan.worlds["mav"] != plan.worlds["ground"]:
         _store_model(plan, plan.worlds["mav"], flight_world(drive))
@@ -306,11 +309,13 @@ def _samples(
     return faulty_imu(imu, faults), faulty_field(field, faults)
 
 
-def _render(plan: FramePlan, workers: int, progress: Progress | None) -> dict[str, dict[str, str]]:
+def _render(
+    plan: FramePlan, pool: FrameWorkers | None, progress: Progress | None
+) -> dict[str, dict[str, str]]:
     """Make all frames; returns the digests of the images by folder and name."""
     digests: dict[str, dict[str, str]] = defaultdict(dict)
     done, total = 0, sum(len(frames.stamps_ns) for frames in plan.frames.values())
-    for files in make_frames(plan, workers):
+    for files in make_frames(plan, pool):
         for file in files:
             digests[file.folder][file.name] = file.digest
         done += len({file.name for file in files})

@@ -73,7 +73,7 @@ class Renderer:
             (height, width, 3) uint8 RGB, textures filtered and edges not (`smooth_edges` does
             that); and (height, width) float32 depth [m], NaN where there is nothing.
         """
-        rect = self._render(camera, T_world_camera)
+        rect = self._render(camera, T_world_camera, coloured=True)
         picture = np.empty((rect.height, rect.width, 3), np.uint8)
         stored = np.empty((rect.height, rect.width), np.float32)
         mujoco.mjr_readPixels(picture, stored, rect, self._context)
@@ -87,7 +87,15 @@ class Renderer:
             self._data.mocap_quat[mocap] = np.roll(pose.quaternion_xyzw(), 1)
         mujoco.mj_kinematics(self._model, self._data)
 
-    def _render(self, camera: str, T_world_camera: SE3) -> mujoco.MjrRect:
+    def depth(self, camera: str, T_world_camera: SE3) -> NDArray[np.float32]:
+        """The depth that `draw` returns, for about a quarter of the time: without textures."""
+        rect = self._render(camera, T_world_camera, coloured=False)
+        stored = np.empty((rect.height, rect.width), np.float32)
+        mujoco.mjr_readPixels(None, stored, rect, self._context)
+        return self._metric(stored[::-1])
+
+    def _render(self, camera: str, T_world_camera: SE3, coloured: bool) -> mujoco.MjrRect:
+        self._option.flags[mujoco.mjtVisFlag.mjVIS_TEXTURE.value] = int(coloured)
         index = self._model.camera(camera).id
         self._data.cam_xpos[index] = T_world_camera.translation
         self._data.cam_xmat[index] = (T_world_camera.rotation @ _OPENCV_FROM_OPENGL).ravel()

@@ -60,44 +60,98 @@ def resampled(picture: NDArray[np.uint8], places: NDArray[np.float32]) -> NDArra
     return np.asarray(taken, np.uint8).reshape(*places.shape[:2], -1)
 
 
+# Each loop below does one kind of work along a row: so the compiler vectorizes all but the gathers.
+
+
 @njit(cache=True, error_model="numpy")
 def _find(rays, rotations, offsets, inverse, intrinsics, places, found):  # type: ignore[no-untyped-def]
-    fx, fy, cx, cy = intrinsics
-    for row in range(len(rays)):
-        R, (tx, ty, tz) = rotations[row], offsets[row]
-        steps = STEPS if abs(tx) + abs(ty) + abs(tz) > 0 else 0
-        for column in range(rays.shape[1]):
-            x, y, z = rays[row, column]
-            a = R[0, 0] * x + R[0, 1] * y + R[0, 2] * z
-            b = R[1, 0] * x + R[1, 1] * y + R[1, 2] * z
-            c = R[2, 0] * x + R[2, 1] * y + R[2, 2] * z
-            u, v = fx * a / c + cx, fy * b / c + cy
-            here = _inverse_depth(inverse, u, v)
-            for _ in range(steps):
-                # 1 / depth on the ray from the row's own place, of the point at the view's depth.
-                own = here * c / (1 - here * tz)
-                w = c + own * tz
-                u, v = fx * (a + own * tx) / w + cx, fy * (b + own * ty) / w + cy
-                here = _inverse_depth(inverse, u, v)
-            places[row, column, 0], places[row, column, 1] = u, v
-            found[row, column] = (1 - here * tz) / (here * c) if here > 0 else np.nan
-
-
-@njit(cache=True, error_model="numpy")
-def _inverse_depth(inverse, u, v):  # type: ignore[no-untyped-def]
-    """Of the nearest pixel's surface at a place [1/m]; 0 where there is nothing."""
     height, width = inverse.shape
-    column = min(max(int(u + 0.5), 1), width - 2)
-    row = min(max(int(v + 0.5), 1), height - 2)
-    here = np.float64(inverse[row, column])
-    slope_x = _slope(inverse[row, column - 1], here, inverse[row, column + 1])
-    slope_y = _slope(inverse[row - 1, column], here, inverse[row + 1, column])
-    return here + slope_x * (u - column) + slope_y * (v - row)
+    across, down = np.empty((height, width)), np.empty((height, width))
+    _inverse_slopes(inverse, across, down)
+    planes = inverse.reshape(-1), across.reshape(-1), down.reshape(-1)
+    count = rays.shape[1]
+    abc, uv, here = np.empty((3, count)), np.empty((2, count)), np.empty(count)
+    for row in range(len(rays)):
+        offset = offsets[row]
+        moved = abs(offset[0]) + abs(offset[1]) + abs(offset[2]) > 0
+        _turn(rays[row], rotations[row], intrinsics, abc[0], abc[1], abc[2], uv[0], uv[1])
+        _inverse_depth(planes, height, width, uv[0], uv[1], here)
+        for _ in range(STEPS if moved else 0):
+            _shift(abc[0], abc[1], abc[2], here, offset, intrinsics, uv[0], uv[1])
+            _inverse_depth(planes, height, width, uv[0], uv[1], here)
+        _store(uv[0], uv[1], here, abc[2], offset[2], places[row], found[row])
 
 
 @njit(cache=True, error_model="numpy")
-def _slope(before, here, after):  # type: ignore[no-untyped-def]
-    """The smaller change of inverse depth to a neighbour; 0 if both are of other surfaces."""
-    back, ahead = here - before, after - here
-    slope = back if abs(back) <= abs(ahead) else ahead
-    return slope if abs(slope) <= MAX_SLOPE * here else 0.0
+def _turn(rays, R, intrinsics, a, b, c, u, v):  # type: ignore[no-untyped-def]
+    """Rays (W, 3) in the view, and the pixels that they point at."""
+    fx, fy, cx, cy = intrinsics
+    for column in range(len(a)):
+        x, y, z = rays[column, 0], rays[column, 1], rays[column, 2]
+        a[column] = R[0, 0] * x + R[0, 1] * y + R[0, 2] * z
+        b[column] = R[1, 0] * x + R[1, 1] * y + R[1, 2] * z
+        c[column] = R[2, 0] * x + R[2, 1] * y + R[2, 2] * z
+    for column in range(len(a)):
+        u[column], v[column] = fx * a[column] / c[column] + cx, fy * b[column] / c[column] + cy
+
+
+@njit(cache=True, error_model="numpy")
+def _shift(a, b, c, here, offset, intrinsics, u, v):  # type: ignore[no-untyped-def]
+    """The pixels that see the points at the view's depth on the rays from the row's own place."""
+    fx, fy, cx, cy = intrinsics
+    tx, ty, tz = offset
+    for column in range(len(a)):
+        # 1 / depth on the ray from the row's own place.
+        own = here[column] * c[column] / (1 - here[column] * tz)
+        w = c[column] + own * tz
+        u[column] = fx * (a[column] + own * tx) / w + cx
+        v[column] = fy * (b[column] + own * ty) / w + cy
+
+
+@njit(cache=True, error_model="numpy")
+def _store(u, v, here, c, tz, places, found):  # type: ignore[no-untyped-def]
+    for column in range(len(u)):
+        places[column, 0], places[column, 1] = u[column], v[column]
+        depth = (1 - here[column] * tz) / (here[column] * c[column])
+        found[column] = depth if here[column] > 0 else np.nan
+
+
+@njit(cache=True, error_model="numpy")
+def _inverse_depth(planes, height, width, u, v, here):  # type: ignore[no-untyped-def]
+    """Of the nearest pixels' surfaces at places [1/m]; 0 where there is nothing.
+    `planes` are inverse depth and its changes to the right and down."""
+    inverse, across, down = planes
+    count = len(u)
+    index = np.empty(count, np.int32)
+    off_x, off_y = np.empty(count), np.empty(count)
+    slope_x, slope_y = np.empty(count), np.empty(count)
+    right, bottom = np.float64(width - 2), np.float64(height - 2)
+    for k in range(count):
+        column = np.int32(min(max(u[k] + 0.5, 1.0), right))
+        row = np.int32(min(max(v[k] + 0.5, 1.0), bottom))
+        off_x[k], off_y[k] = u[k] - column, v[k] - row
+        index[k] = row * np.int32(width) + column
+    for k in range(count):
+        here[k], slope_x[k], slope_y[k] = inverse[index[k]], across[index[k]], down[index[k]]
+    for k in range(count):
+        here[k] = here[k] + slope_x[k] * off_x[k] + slope_y[k] * off_y[k]
+
+
+@njit(cache=True, error_model="numpy")
+def _inverse_slopes(inverse, across, down):  # type: ignore[no-untyped-def]
+    """Changes of inverse depth (H, W) to the right and down, on each pixel's own surface.
+    The frame of one pixel is left out."""
+    for row in range(1, len(inverse) - 1):
+        here = inverse[row]
+        _slopes(here[:-2], here[1:-1], here[2:], across[row, 1:-1])
+        _slopes(inverse[row - 1], here, inverse[row + 1], down[row])
+
+
+@njit(cache=True, error_model="numpy")
+def _slopes(before, here, after, slopes):  # type: ignore[no-untyped-def]
+    """The smaller changes of inverse depth to a neighbour; 0 if both are of other surfaces."""
+    for k in range(len(slopes)):
+        middle = np.float64(here[k])
+        back, ahead = middle - before[k], after[k] - middle
+        slope = back if abs(back) <= abs(ahead) else ahead
+        slopes[k] = slope if abs(slope) <= MAX_SLOPE * middle else 0.0

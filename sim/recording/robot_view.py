@@ -16,7 +16,7 @@ from sim.recording.bodies_in_view import BodiesInView
 from sim.recording.drone_shadow import DroneShadow
 from sim.recording.render import Renderer
 from sim.recording.resample import places_in_view, resampled
-from sim.recording.row_poses import strip_poses
+from sim.recording.row_poses import RowPoses, strip_poses
 from sim.recording.smooth_edges import smooth_edges
 from sim.recording.view_tiles import Tile, is_plain, tiles_of
 from sim.robots.motion import Motion, Robot
@@ -86,14 +86,33 @@ class RobotView:
         mav = None if self._shadow is None else self._motion.pose("mav", time_ns).translation
         return _Moving(self._bodies.edges(time_ns), mav)
 
+    def depth(self, time_ns: int) -> NDArray[np.float32]:
+        """The depth that `draw` returns, without its picture."""
+        self._bodies.place(self._renderer, time_ns)
+        if self._rays is None:
+            pose = self._motion.camera_pose(self._robot, time_ns)
+            return self._renderer.depth(self._tiles[0].name, pose)
+        depth = np.empty((self._lens.height, self._lens.width), np.float32)
+        for tile in self._tiles:
+            place = tile.rows, tile.columns
+            T_world_view, poses = self._poses(tile, time_ns)
+            seen = self._renderer.depth(tile.name, T_world_view)
+            _, depth[place] = places_in_view(self._rays[place], poses, seen, tile.camera)
+        return depth
+
     def _tile(self, tile: Tile, rays: NDArray[np.float64], time_ns: int, moving: _Moving) -> Drawn:
+        T_world_view, poses = self._poses(tile, time_ns)
+        picture, depth = self._view(tile, T_world_view, moving)
+        places, found = places_in_view(rays, poses, depth, tile.camera)
+        return resampled(picture, places), found
+
+    def _poses(self, tile: Tile, time_ns: int) -> tuple[SE3, RowPoses]:
+        """`T_world_view` of a tile, and the poses of its rows in that frame."""
         T_world_strip, poses = strip_poses(
             self._motion, self._robot, self._lens, time_ns, tile.rows
         )
-        poses = poses.seen_from(tile.T_camera_view)
-        picture, depth = self._view(tile, T_world_strip @ tile.T_camera_view, moving)
-        places, found = places_in_view(rays, poses, depth, tile.camera)
-        return resampled(picture, places), found
+        T_camera_view = tile.T_camera_view
+        return T_world_strip @ T_camera_view, poses.seen_from(T_camera_view)
 
     def _view(self, tile: Tile, T_world_view: SE3, moving: _Moving) -> Drawn:
         """One pinhole view, with smooth edges."""

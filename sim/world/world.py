@@ -90,6 +90,17 @@ def build_world(scene: Scene, seed: int, pictures: bool = True) -> World:
     return _build_indoor(scene, seed, boxes, (), scene.light, picture_rng, pictures)
 
 
+def painted(plain: World) -> World:
+    """The same world as `build_world` makes it with pictures, from the one without; boxes do not
+    settle again."""
+    scene, seed = plain.scene, plain.seed
+    geometry_rng, picture_rng, _ = _streams(scene, seed)
+    if scene.terrain:
+        rngs = geometry_rng, picture_rng
+        return _build_outdoor(scene, seed, scene.terrain, scene.light, *rngs, True)
+    return _build_indoor(scene, seed, plain.boxes, (), scene.light, picture_rng, True)
+
+
 def flight_world(drive: World, pictures: bool = True) -> World:
     """The world as the MAV sees it: `drive`, that of the ground robot, if nothing changes.
 

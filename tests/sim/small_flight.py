@@ -3,8 +3,7 @@
 import numpy as np
 
 from sim.recording.recorder import image_stamps
-from sim.scene import Scene
-from sim.world.world import World, build_world
+from sim.world.world import World
 
 SCENE = """
 name = "small"
@@ -36,6 +35,6 @@ def few_stamps(motion_stamps_ns: np.ndarray, first_ns: int) -> np.ndarray:
     return stamps[np.linspace(0, len(stamps) - 1, FRAMES).astype(int)]
 
 
-def plain_world(scene: Scene, seed: int, pictures: bool = True) -> World:
-    """Without pictures, which take long to make."""
-    return build_world(scene, seed, pictures=False)
+def unpainted(plain: World) -> World:
+    """The world as it is: pictures take long to make."""
+    return plain

@@ -17,7 +17,7 @@ from sim.recording.recorder import record
 from sim.recording.truth import Truth
 from sim.scene import parse_scene
 from sim.sensors.presets import NONE
-from tests.sim.small_flight import SCENE, few_stamps, plain_world
+from tests.sim.small_flight import SCENE, few_stamps, unpainted
 
 PAGE = Path(__file__).parents[2] / "docs" / "add_a_sensor.md"
 EXAMPLES = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.S)
@@ -27,7 +27,7 @@ PRESET, FAILING, RANGEFINDER = EXAMPLES
 @pytest.fixture(autouse=True)
 def _few_images_without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recorder, "image_stamps", few_stamps)
-    monkeypatch.setattr(recorder, "build_world", plain_world)
+    monkeypatch.setattr(recorder, "painted", unpainted)
 
 
 def names_after(example: str, folder: Path) -> dict[str, Any]:

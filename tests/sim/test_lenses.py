@@ -85,7 +85,9 @@ def test_depth_is_that_of_each_pixels_ray(heap: Heap, lens: Lens) -> None:
     true = scene.cast_rays(rays_world(lens))["t_hit"].numpy()
     true[~np.isfinite(true)] = np.nan
     with renderer(heap.spec, lens) as drawing:
-        _, depth = view(lens, drawing).draw(TIME_NS)
+        seen = view(lens, drawing)
+        _, depth = seen.draw(TIME_NS)
+        np.testing.assert_array_equal(seen.depth(TIME_NS), depth)
     error = np.abs(depth / true - 1)
     assert np.isfinite(error).mean() > 0.6
     assert np.nanmedian(error) < 2e-5

@@ -18,15 +18,15 @@ from sim.recording.recorder import image_stamps, record
 from sim.recording.truth import Truth
 from sim.scene import parse_scene
 from sim.sensors.presets import NOMINAL, NONE, SensorPreset
-from sim.world.world import build_world
-from tests.sim.small_flight import FRAMES, SCENE, few_stamps, plain_world
+from sim.world.world import painted
+from tests.sim.small_flight import FRAMES, SCENE, few_stamps, unpainted
 
 
 @pytest.fixture(scope="module", autouse=True)
 def _small_recordings() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(recorder, "image_stamps", few_stamps)
-        patch.setattr(recorder, "build_world", plain_world)
+        patch.setattr(recorder, "painted", unpainted)
         yield
 
 
@@ -120,7 +120,7 @@ def test_depth_errs_by_scale_and_noise_only(nominal: Path) -> None:
 def test_the_same_seed_gives_the_same_bytes_whoever_renders(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(recorder, "build_world", build_world)
+    monkeypatch.setattr(recorder, "painted", painted)
     one, two = make(tmp_path / "one", workers=1), make(tmp_path / "two", workers=2)
     assert contents(one) == contents(two)
 

@@ -39,6 +39,23 @@ def test_depth_is_that_of_ray_casting(heap: Heap, depths: dict, name: str) -> No
     assert_same_depth(depths[name], cast)
 
 
+def test_depth_alone_is_that_of_a_picture(heap: Heap) -> None:
+    spec = heap.spec.copy()
+    # MuJoCo's sky has a depth.
+    spec.add_texture(
+        name="sky",
+        type=mujoco.mjtTexture.mjTEXTURE_SKYBOX,
+        builtin=mujoco.mjtBuiltin.mjBUILTIN_GRADIENT,
+        width=16,
+        height=96,
+    )
+    with Renderer(with_cameras(spec, CAMERAS)) as renderer:
+        for name, pose in POSES.items():
+            picture, depth = renderer.draw(name, pose)
+            np.testing.assert_array_equal(renderer.depth(name, pose), depth)
+            np.testing.assert_array_equal(renderer.draw(name, pose)[0], picture)
+
+
 def one_sample_per_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
     """pyrender's antialiasing would move the samples off the pixel centres."""
     allocate = pyrender.renderer.glRenderbufferStorageMultisample

@@ -16,7 +16,7 @@ from sim.recording.recorder import Flight, record, rendered
 from sim.recording.truth import Truth
 from sim.scene import parse_scene
 from sim.sensors.presets import NOMINAL
-from tests.sim.small_flight import FRAMES, SCENE, few_stamps, plain_world
+from tests.sim.small_flight import FRAMES, SCENE, few_stamps, unpainted
 
 FLIGHT = Flight(parse_scene(SCENE, "small.toml"), 3, 1, NOMINAL)
 
@@ -25,7 +25,7 @@ FLIGHT = Flight(parse_scene(SCENE, "small.toml"), 3, 1, NOMINAL)
 def _small_recordings() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(recorder, "image_stamps", few_stamps)
-        patch.setattr(recorder, "build_world", plain_world)
+        patch.setattr(recorder, "painted", unpainted)
         yield
 
 

@@ -23,7 +23,7 @@ from sim.robots.motion import ROBOTS, Robot
 from sim.scene import Scene, parse_scene
 from sim.sensors.presets import NONE
 from sim.world.world import World, build_world, flight_world
-from tests.sim.small_flight import SCENE, few_stamps, plain_world
+from tests.sim.small_flight import SCENE, few_stamps, unpainted
 
 SEED = 3
 
@@ -42,7 +42,7 @@ def plain_flight(drive: World, pictures: bool = True) -> World:
 def _small_recordings() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(recorder, "image_stamps", few_stamps)
-        patch.setattr(recorder, "build_world", plain_world)
+        patch.setattr(recorder, "painted", unpainted)
         patch.setattr(recorder, "flight_world", plain_flight)
         yield
 

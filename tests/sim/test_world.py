@@ -12,7 +12,7 @@ from sim.appearance.pictures import CUBE_FACES, add_picture
 from sim.geometry.surface import box_mesh, join, rectangle_mesh
 from sim.recording.render import Renderer, with_cameras
 from sim.scene import Light, Scene, load_scene
-from sim.world.world import World, build_world
+from sim.world.world import World, build_world, painted
 
 
 def small(name: str = "tiny", **changes: object) -> Scene:
@@ -35,10 +35,16 @@ def test_the_same_seed_gives_the_same_bytes() -> None:
 
 
 def test_geometry_does_not_depend_on_pictures() -> None:
-    plain, painted = build_world(small(), 5, pictures=False), build_world(small(), 5)
-    assert plain.vertices.tobytes() == painted.vertices.tobytes()
-    names = [[geom.name for geom in world.spec.geoms] for world in (plain, painted)]
+    plain, whole = build_world(small(), 5, pictures=False), build_world(small(), 5)
+    assert plain.vertices.tobytes() == whole.vertices.tobytes()
+    names = [[geom.name for geom in world.spec.geoms] for world in (plain, whole)]
     assert names[0] == names[1]
+
+
+def test_a_plain_world_is_painted_as_one_built_with_pictures() -> None:
+    later, whole = painted(build_world(small(), 5, pictures=False)), build_world(small(), 5)
+    assert later.vertices.tobytes() == whole.vertices.tobytes()
+    assert textures(later) == textures(whole)
 
 
 def test_another_seed_gives_another_world_with_the_same_paths() -> None:
