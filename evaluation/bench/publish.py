@@ -103,6 +103,13 @@ def footnotes(report: BenchReport) -> list[str]:
         for real in report.pipeline
         if real.resident_mib
     ]
+    lines += [
+        f"{cores(made.threads)}: {made.recorded_s:.0f} s of {made.scene} with {made.sensors} "
+        f"sensors simulated in {made.wall_s:.1f} s: {made.recorded_s_a_second:.2f} recorded "
+        f"seconds per second, {made.cpu_ms_an_image:.1f} ms of processor time per image, "
+        f"{made.mib_a_minute:.0f} MiB per minute"
+        for made in report.recordings
+    ]
     if report.live is not None:
         for title, mav, ground in live_rows(report.live):
             both = f"MAV {mav}, ground robot {ground}" if mav and ground else mav or ground

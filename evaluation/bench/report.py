@@ -108,6 +108,21 @@ class RealTime(Part):
     resident_mib: tuple[Amount, ...] = ()
 
 
+class RecordingSpeed(Part):
+    """A whole recording made by `airground simulate`, its start included.
+    `cpu_s` is the processor time of all processes."""
+
+    scene: str
+    sensors: str
+    threads: Positive
+    recorded_s: Amount
+    wall_s: Amount
+    cpu_s: Amount
+    recorded_s_a_second: Amount
+    cpu_ms_an_image: Amount
+    mib_a_minute: Amount
+
+
 class Machine(Part):
     """Where the benchmark ran, and under which load.
     `other_cores` is the mean number of cores that other programs kept busy, null if unknown."""
@@ -158,6 +173,7 @@ class BenchReport(Part):
     rows: tuple[RowResult, ...]
     pipeline: tuple[RealTime, ...] = ()
     live: LiveSummary | None = None
+    recordings: tuple[RecordingSpeed, ...] = ()
     curves: tuple[CurveResult, ...] = ()
 
     def to_json(self) -> str:

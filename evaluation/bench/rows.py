@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 from airground.errors import InputError
-from evaluation.bench import dense_rows, localization_rows
+from evaluation.bench import dense_rows, localization_rows, simulation_rows
 from evaluation.bench.material import Material
 from evaluation.bench.peers import PEERS, Peer
+from evaluation.bench.recording_speed import RECORDED
 from evaluation.bench.work import Work
 from evaluation.setup.published import TABLE_I, TimedStage
 
@@ -41,7 +43,7 @@ class Contender(NamedTuple):
 
 STAGES = {stage.metric: stage for stage in TABLE_I}
 EGOMOTION, DENSE, GLOBAL = "Egomotion", "Dense reconstruction", "Global localization"
-REFINEMENT, INPUT = "Pose refinement", "Input"
+REFINEMENT, INPUT, SIMULATION = "Pose refinement", "Input", "Simulation"
 
 
 def _ours(metric: str, title: str, group: str) -> TimedStage:
@@ -79,6 +81,25 @@ ROWS = (
     Row(STAGES["augmentation"], localization_rows.augmentation),
     Row(_ours("read_grey", "Read and decode, MAV", INPUT), dense_rows.read_grey),
     Row(_ours("read_rgbd", "Read and decode, ground robot", INPUT), dense_rows.read_colour_depth),
+    Row(
+        _ours("sim_draw_grey", "Draw an image, MAV", SIMULATION),
+        partial(simulation_rows.draw, "mav"),
+    ),
+    Row(
+        _ours("sim_draw_rgbd", "Draw an image, ground robot", SIMULATION),
+        partial(simulation_rows.draw, "ground"),
+    ),
+    Row(
+        _ours("sim_exposure_grey", "Exposure, MAV", SIMULATION),
+        partial(simulation_rows.expose, "mav"),
+    ),
+    Row(
+        _ours("sim_exposure_rgbd", "Exposure, ground robot", SIMULATION),
+        partial(simulation_rows.expose, "ground"),
+    ),
+    Row(_ours("sim_depth_noise", "Depth noise", SIMULATION), simulation_rows.depth_noise),
+    Row(_ours("sim_png_grey", "Encode, MAV", SIMULATION), simulation_rows.encode_grey),
+    Row(_ours("sim_png_rgbd", "Encode, ground robot", SIMULATION), simulation_rows.encode_rgbd),
 )
 
 PLAYED = {
@@ -90,7 +111,7 @@ PIPELINE = "pipeline"
 """The row of the whole pipeline: its real-time factor."""
 LIVE = "live"
 """The row of a live run: images dropped, and delays of the poses."""
-NAMES = (*PLAYED, PIPELINE, LIVE, *(row.name for row in ROWS))
+NAMES = (*PLAYED, PIPELINE, LIVE, *RECORDED, *(row.name for row in ROWS))
 BY_NAME = {row.name: row for row in ROWS}
 
 

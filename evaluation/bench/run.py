@@ -16,6 +16,7 @@ from evaluation.bench.curves import CURVES, Curve, CurvePoint, exponent
 from evaluation.bench.floors import Speed
 from evaluation.bench.lane import Lane, LaneProcess, Opened, lane_processes
 from evaluation.bench.machine import LoadAverage, LoadMeter
+from evaluation.bench.recording_speed import DURATION_S, RECORDED, record_anew
 from evaluation.bench.report import (
     SCHEMA,
     BenchReport,
@@ -57,6 +58,11 @@ def run_benchmark(
         say(f"playing {recording.scene} at its own rate")
         with lane_processes([threads]) as (process,):
             live = process.live(path)
+    recordings = []
+    for name in names:
+        if name in RECORDED:
+            say(f"simulating {DURATION_S:.0f} s with {RECORDED[name]} sensors")
+            recordings.append(record_anew(name, threads))
     with lane_processes(counts) as processes:
         opened: dict[int, Opened] = {}
         for process in processes:
@@ -89,6 +95,7 @@ def run_benchmark(
         rows=tuple(rows),
         pipeline=_pipeline(opened) if PIPELINE in names else (),
         live=live,
+        recordings=tuple(recordings),
         curves=tuple(curves),
     )
 

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 SCENE = "tiny"
 PLAY_S = 120.0
 """The recording of `SCENE` played through the pipeline on one core and on all, and live [s]."""
+SIMULATE_S = 80.0
+"""One of the rows that simulate a recording of 60 s [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +56,7 @@ class Bench(SensorOption, SeedOption, Verb):
         from rich.console import Console
 
         from evaluation.bench.publish import print_table
-        from evaluation.bench.rows import checked_names
+        from evaluation.bench.rows import RECORDED, checked_names
         from evaluation.bench.run import run_benchmark
         from evaluation.setup.output import check_free
         from evaluation.setup.progress import announce, step
@@ -68,6 +70,7 @@ class Bench(SensorOption, SeedOption, Verb):
         recorded_s = 0.0 if self.recording is not None else load_scene(SCENE).duration_s
         expected_s = work_s(recorded_s * RENDER_S_PER_S, self.workers())
         expected_s += PLAY_S + parts * seconds
+        expected_s += sum(SIMULATE_S for name in names if name in RECORDED)
         cores = "1 core" if self.workers() == 1 else f"1 and {self.workers()} cores"
         announce(f"times {len(names)} rows on {cores}", expected_s)
         with (
@@ -90,11 +93,12 @@ class Bench(SensorOption, SeedOption, Verb):
     def _parts(self, names: Sequence[str]) -> int:
         """How many parts the benchmark names as it goes on."""
         from evaluation.bench.curves import CURVES
-        from evaluation.bench.rows import BY_NAME, LIVE
+        from evaluation.bench.rows import BY_NAME, LIVE, RECORDED
 
         lanes = len({1, self.workers()})
         rows = sum(name in BY_NAME for name in names)
-        return lanes + rows + (LIVE in names) + (len(CURVES) if self.curves else 0)
+        whole = sum(name in RECORDED for name in names)
+        return lanes + rows + whole + (LIVE in names) + (len(CURVES) if self.curves else 0)
 
     def _record(self, path: Path) -> Path:
         from sim.recording.recorder import record

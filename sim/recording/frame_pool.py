@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from airground.errors import AirgroundError
 from sim.interrupts import deaf_children, end_with_parent
 from sim.recording.frames import FrameMaker, FramePlan, Written
+from sim.recording.render import draw_with
 from sim.robots.motion import ROBOTS, Robot
 
 FRAMES_PER_TASK = 8
@@ -153,8 +154,7 @@ _maker: tuple[Path, FrameMaker] | None = None  # one a process, of the plan with
 
 def _start_worker(threads: int) -> None:
     end_with_parent()
-    # Of Mesa's software renderer, beside its caller's: one more would only wait for the other.
-    os.environ.setdefault("LP_NUM_THREADS", str(threads if threads > 1 else 0))
+    draw_with(threads)
     cv2.setNumThreads(1)
 
 

@@ -84,7 +84,12 @@ class Written:
 
 
 class FrameMaker:
-    """Draws frames with their sensors' faults; a context manager, for the graphics context."""
+    """Draws frames with their sensors' faults; a context manager, for the graphics context.
+
+    Attributes:
+        views: What each robot's camera sees before its sensor's faults.
+        rays: Where each camera's pixels look.
+    """
 
     def __init__(self, plan: FramePlan) -> None:
         self._plan = plan
@@ -94,7 +99,7 @@ class FrameMaker:
         edges = {files: Edges.load(files.edges) for files in plan.worlds.values()}
         renderers = {files: _renderer(files) for files in edges}
         self._renderers = list(renderers.values())
-        self._views = {
+        self.views = {
             robot: self._view(robot, renderers[files], edges[files], plan.shadows.get(robot))
             for robot, files in plan.worlds.items()
         }
@@ -103,12 +108,12 @@ class FrameMaker:
             self._renderers.append(_renderer(plan.unlit))
             of_drive = edges[plan.worlds["ground"]]
             self._unlit = self._view("ground", self._renderers[-1], of_drive, None)
-        self._pixels = {robot: PixelRays.of(self._lens(robot)) for robot in ROBOTS}
+        self.rays = {robot: PixelRays.of(self._lens(robot)) for robot in ROBOTS}
         self._sensors: dict[Robot, ImageSensor] = {}
         if plan.preset.image is not None:
             for number, robot in enumerate(ROBOTS, start=1):
                 rng = np.random.default_rng([*plan.seeds, number])
-                self._sensors[robot] = ImageSensor.of(self._pixels[robot], plan.preset.image, rng)
+                self._sensors[robot] = ImageSensor.of(self.rays[robot], plan.preset.image, rng)
 
     def __enter__(self) -> FrameMaker:
         return self
@@ -131,31 +136,31 @@ class FrameMaker:
 
     def mav(self, index: int) -> NDArray[np.uint8]:
         """(height, width) grey image of the MAV."""
-        time_ns, rng = self._start("mav", index)
-        grey, depth = self._views["mav"].draw(time_ns)
+        time_ns, rng = self.start("mav", index)
+        grey, depth = self.views["mav"].draw(time_ns)
         if "mav" in self._sensors:
-            grey = self._expose("mav", grey, depth, time_ns, rng)
+            grey = self.expose("mav", grey, depth, time_ns, rng)
         return self._plan.frames["mav"].image(index, np.asarray(grey[..., 0], np.uint8))
 
     def ground(self, index: int) -> tuple[NDArray[np.uint8], NDArray[np.uint16]]:
         """(height, width, 3) RGB and (height, width) depth as PNG values, of the ground robot."""
-        time_ns, rng = self._start("ground", index)
-        colour, depth = self._views["ground"].draw(time_ns)
+        time_ns, rng = self.start("ground", index)
+        colour, depth = self.views["ground"].draw(time_ns)
         if self._unlit is not None and self._plan.lamp is not None:
             unlit, _ = self._unlit.draw(time_ns)
             colour = self._plan.lamp.lit(colour, unlit, depth, self._lens("ground").rays())
         if "ground" in self._sensors:
-            colour = self._expose("ground", colour, depth, time_ns, rng)
+            colour = self.expose("ground", colour, depth, time_ns, rng)
         delay_ns = self._plan.true.ground.depth.delay_ns
         if delay_ns:
-            depth = self._views["ground"].depth(time_ns + delay_ns)
+            depth = self.views["ground"].depth(time_ns + delay_ns)
         if self._plan.preset.depth is not None:
-            depth = kinect_depth(depth, self._pixels["ground"], self._plan.preset.depth, rng)
+            depth = kinect_depth(depth, self.rays["ground"], self._plan.preset.depth, rng)
         frames = self._plan.frames["ground"]
         units = frames.depth_units(index, self._depth_units(depth))
         return frames.image(index, colour), units
 
-    def _start(self, robot: Robot, index: int) -> tuple[int, np.random.Generator]:
+    def start(self, robot: Robot, index: int) -> tuple[int, np.random.Generator]:
         """When a frame is really taken [ns], and what its noise is drawn from."""
         taken = int(self._plan.frames[robot].taken[index])
         stamp = int(self._plan.taken_ns[robot][taken])
@@ -171,9 +176,10 @@ class FrameMaker:
         motion, bodies = self._motion, self._bodies
         return RobotView(robot, lens, motion, renderer, edges, grey, bodies, shadow)
 
-    def _expose(
+    def expose(
         self, robot: Robot, sharp: NDArray, depth: NDArray, time_ns: int, rng: np.random.Generator
     ) -> NDArray[np.uint8]:
+        """The picture that a robot's sensor takes of what its view has drawn at a time [ns]."""
         sensor = self._sensors[robot]
         half_ns = round(sensor.noise.exposure_s * 0.5e9)
         start = self._motion.camera_pose(robot, time_ns - half_ns)

@@ -173,6 +173,12 @@ def _open_context(width: int, height: int) -> _EglContext | mujoco.GLContext:
     return context
 
 
+def draw_with(threads: int) -> None:
+    """Limit the threads of Mesa's software renderer; call it before there is a renderer.
+    They come beside the caller's, which waits for them, so one thread is the caller's."""
+    os.environ.setdefault("LP_NUM_THREADS", str(threads if threads > 1 else 0))
+
+
 def with_cameras(spec: mujoco.MjSpec, cameras: Mapping[str, PinholeCamera]) -> mujoco.MjModel:
     """Compile a world (left as it is) with cameras of exact intrinsics, by name.
     It is drawn with one sample per pixel, at the pixel's centre.

@@ -9,7 +9,6 @@ from multiprocessing.connection import Connection
 import pytest
 
 from sim.interrupts import end_with_parent
-from sim.recording.frame_pool import FrameWorkers
 
 SPAWN = multiprocessing.get_context("spawn")
 
@@ -39,20 +38,3 @@ def test_a_child_ends_with_a_parent_that_is_killed() -> None:
     with pytest.raises(EOFError):
         mine.recv()
     process.join()
-
-
-def _fail_with_a_worker() -> None:
-    with FrameWorkers(1):
-        assert len(multiprocessing.active_children()) == 2
-        raise ValueError("wrong")
-
-
-def test_an_error_ends_the_processes_that_make_frames_and_no_others() -> None:
-    _, theirs = SPAWN.Pipe()
-    other = SPAWN.Process(target=child, args=(theirs,))
-    other.start()
-    with pytest.raises(ValueError, match="wrong"):
-        _fail_with_a_worker()
-    assert multiprocessing.active_children() == [other]
-    other.kill()
-    other.join()

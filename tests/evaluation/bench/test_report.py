@@ -39,6 +39,7 @@ from evaluation.bench.report import (
     PeerTiming,
     RealTime,
     RecordingInfo,
+    RecordingSpeed,
     RowResult,
     Timing,
 )
@@ -103,6 +104,12 @@ def report() -> BenchReport:
             )
         ],
         live=live_summary(live_rows(mav_dropped=3)),
+        recordings=[
+            RecordingSpeed(
+                scene="indoor_a", sensors="real", threads=2, recorded_s=60, wall_s=75, cpu_s=140,
+                recorded_s_a_second=0.8, cpu_ms_an_image=38.9, mib_a_minute=1500,
+            )
+        ],
         curves=[
             CurveResult(
                 name="voxels",
@@ -166,6 +173,10 @@ def test_what_is_printed_states_the_conditions(report: BenchReport) -> None:
     assert (
         "2 cores: 800 to 1000 MiB held after the tenths of the recording, at the end 900" in shown
     )
+    assert (
+        "2 cores: 60 s of indoor_a with real sensors simulated in 75.0 s: 0.80 recorded seconds "
+        "per second, 38.9 ms of processor time per image, 1500 MiB per minute"
+    ) in shown
     assert "live, images dropped: MAV 3 of 7, ground robot 0 of 4" in shown
     assert "live, peak memory, all processes: 1100 MiB" in shown
     assert "other programs: 0.25 cores busy" in shown

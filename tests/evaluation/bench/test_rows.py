@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ from airground.core.cloud import Source
 from airground.core.events import Event, GroundTracked, MavTracked
 from airground.core.se3 import SE3
 from airground.errors import InputError
-from evaluation.bench import dense_rows, floors, localization_rows, peers
+from airground.io.png import decode_png
+from evaluation.bench import dense_rows, floors, localization_rows, peers, simulation_rows
 from evaluation.bench.curves import CURVES, exponent, tiled
 from evaluation.bench.floors import Floor, Speed
 from evaluation.bench.lane import Lane
@@ -33,6 +35,16 @@ SPEED = Speed(threads=1, bandwidth_gb_s=1e3, arithmetic_gflop_s=1e4)
 @pytest.fixture(scope="module")
 def material(tmp_path_factory: pytest.TempPathFactory) -> Material:
     return make_material(tmp_path_factory.mktemp("bench") / "recording")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _small_flight() -> Iterator[None]:
+    """The simulator's rows over a scene that is soon built."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(simulation_rows, "SCENE", "tiny")
+        patch.setattr(simulation_rows, "DURATION_S", 8.0)
+        yield
+    simulation_rows.simulated.cache_clear()
 
 
 def test_two_rows_are_timed_on_both_lanes_with_their_peers(material: Material) -> None:
@@ -71,6 +83,17 @@ def test_every_row_and_its_peers_run_above_their_floor(material: Material, row) 
         assert 0 < work.floor.least_ms(SPEED) < min(sample.wall_ms for sample in samples)
     for peer in row.peers:
         assert take_turn(peer.make(material), 0.0)[0].wall_ms > 0
+
+
+def test_the_simulators_rows_make_the_images_of_a_recording(material: Material) -> None:
+    flight = simulation_rows.simulated()
+    index, time_ns = flight.indices("mav")[0], flight.times_ns("mav")[0]
+    picture, depth = simulation_rows.draw("mav", material).run()
+    _, rng = flight.maker.start("mav", index)
+    exposed = flight.maker.expose("mav", picture, depth, time_ns, rng)
+    np.testing.assert_array_equal(exposed[..., 0], flight.maker.mav(index))
+    packed = simulation_rows.encode_grey(material).run()
+    np.testing.assert_array_equal(decode_png(packed), flight.maker.mav(index))
 
 
 def test_adding_frames_begins_anew_when_all_views_are_in(material: Material) -> None:
