@@ -48,7 +48,8 @@ def places_in_view(
     places = np.empty((*rays.shape[:2], 2), np.float32)
     found = np.empty(rays.shape[:2], np.float32)
     intrinsics = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
-    inverse = np.nan_to_num(np.float32(1) / depth)  # 0 where there is nothing
+    inverse = np.empty(depth.shape, np.float32)
+    _invert(depth, inverse)
     _find(rays, rows.rotations, rows.translations, inverse, intrinsics, places, found)
     return places, found
 
@@ -61,6 +62,15 @@ def resampled(picture: NDArray[np.uint8], places: NDArray[np.float32]) -> NDArra
 
 
 # Each loop below does one kind of work along a row: so the compiler vectorizes all but the gathers.
+
+
+@njit(cache=True, error_model="numpy")
+def _invert(depth, inverse):  # type: ignore[no-untyped-def]
+    """Inverse depth [1/m], 0 where there is nothing."""
+    for row in range(len(depth)):
+        for column in range(depth.shape[1]):
+            one = np.float32(1) / depth[row, column]
+            inverse[row, column] = one if one > 0 else np.float32(0)
 
 
 @njit(cache=True, error_model="numpy")
