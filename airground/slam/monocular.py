@@ -14,6 +14,7 @@ from airground.slam.frame import Frame, require_order
 from airground.slam.front_end import ScaleEstimate, TrackedPose, Tracking
 from airground.slam.geometry.pose_estimation import PoseFit
 from airground.slam.keyframe_slam import KeyframeSlam
+from airground.slam.stale_images import StaleImages
 from airground.slam.starts import RestStart, TwoViewWait
 from airground.slam.tight_scale import TightScale
 
@@ -43,6 +44,7 @@ class MonocularSlam:
         self._rest = RestStart(calibration)
         self._two_views = TwoViewWait(calibration, config.monocular_slam, start_rng)
         self._left = self._finished = False
+        self._images = StaleImages(self._slam)
         self._last_ns: int | None = None
 
     def add_imu(self, samples: ImuSamples) -> None:
@@ -59,7 +61,7 @@ class MonocularSlam:
         if not slam.begun:
             self._begin(frame)
             return self._initializing(frame)
-        fit, corrected = slam.track(frame)
+        fit, corrected = self._images.track(frame)
         corrected |= self._scale.update(fit is not None)
         if fit is not None:
             slam.note(image.stamp_ns)

@@ -9,6 +9,7 @@ import numpy as np
 from airground.core.arrays import F64
 from airground.core.messages import ImuNoise, ImuSamples
 from airground.core.se3 import SE3, nearest_rotation
+from airground.slam.inertial.failed_samples import FailedSamples
 from airground.slam.inertial.preintegration import ImuBuffer, Preintegration
 from airground.slam.rig_state import RigState
 
@@ -18,8 +19,10 @@ KEPT_NS = 1_000_000_000
 """Samples from before the last keyframe that are kept: the vertical is looked for in them when a
 map begins anew [ns]."""
 MAX_COAST_S = 3.0
-"""For this long a robot is believed to go on without a look at the scene. Inertial dead
-reckoning drifts by centimetres meanwhile; others may have stopped or turned off."""
+"""For this long a robot is believed to go on without a look at the scene: it may then have stopped
+or turned off."""
+MAX_INERTIAL_COAST_S = 6.0
+"""The same by inertia, which drifts by 0.1 m in 5 s."""
 POSITION_SIGMA_M = 0.02
 """Standard deviation of an inertially predicted position, from one image to the next [m]."""
 HAND_ACCELERATION = 3.0
@@ -61,10 +64,12 @@ class MotionModel:
     def __init__(self, imu: ImuNoise | None, time_offset_ns: int) -> None:
         self.buffer = ImuBuffer(imu) if imu is not None else None
         self._offset_ns = time_offset_ns
+        self._failed = FailedSamples()
 
     def add(self, samples: ImuSamples) -> None:
+        """Take samples; those that measure nothing count as missing."""
         if self.buffer is not None:
-            self.buffer.add(samples)
+            self.buffer.add(self._failed.left_out(samples))
 
     def forget_before(self, stamp_ns: int) -> None:
         """Drop inertial samples from long before an image."""
@@ -144,11 +149,13 @@ class MotionModel:
         """The state at an image that shows nothing, `unseen_s` after the last one with a pose [s]:
         a robot goes on for a while."""
         state = prediction.state
+        if prediction.inertial:
+            # After missing images one prediction may reach over all of them.
+            stopped = unseen_s > MAX_INERTIAL_COAST_S
+            return replace(state, velocity=np.zeros(3)) if stopped else state
         if unseen_s > MAX_COAST_S:
             turned = before if prediction.rotation_sigma is None else state
             return replace(before, rotation=turned.rotation, velocity=np.zeros(3))
-        if prediction.inertial:
-            return state
         # The last turn is repeated; without this its rounding error would double each time.
         rotation = nearest_rotation(state.rotation)
         # What drives along a curve turns its velocity with it.

@@ -12,6 +12,7 @@ from airground.core.trajectory import Trajectory
 from airground.slam.frame import Frame, require_order
 from airground.slam.front_end import TrackedPose, Tracking
 from airground.slam.keyframe_slam import KeyframeSlam
+from airground.slam.stale_images import StaleImages
 from airground.slam.starts import StandStill, level_start
 
 HAND_HELD = 1.5
@@ -45,6 +46,7 @@ class RgbdSlam:
         self._slam.metric = True
         self._standing = StandStill(calibration)
         self._most_points = 0
+        self._images = StaleImages(self._slam)
         self._last_ns: int | None = None
 
     def add_imu(self, samples: ImuSamples) -> None:
@@ -61,7 +63,7 @@ class RgbdSlam:
         slam = self._slam
         if not slam.begun:
             return self._begin(frame)
-        fit, corrected = slam.track(frame)
+        fit, corrected = self._images.track(frame)
         if fit is None:
             return TrackedPose(image.stamp_ns, Tracking.LOST, None)
         if not slam.inertial:

@@ -1,0 +1,153 @@
+"""One robot tracked through faults of its sensors, held against the truth."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from airground.config import Config
+from airground.core.cloud import Source
+from airground.core.messages import GroundImage, ImuSamples, MavImage
+from airground.core.se3 import SE3
+from airground.io.recording import Recording
+from airground.io.robot_recording import RobotRecording
+from airground.slam.front_end import TrackedPose, Tracking
+from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
+from sim.recording.recorder import Flight, rendered
+from sim.recording.truth import Truth
+from sim.sensors.faults import Fault, faulty_imu
+from sim.sensors.faulty_frames import FaultyFrames
+
+AFTER_S = 5.0
+"""Time after the last fault in which the robot can find itself again [s]."""
+SILENT_M, SILENT_SIGMAS = 0.05, 3.0
+"""A pose whose error grew by more than both, by its own covariance, is silently wrong."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of the poses of one robot.
+
+    Attributes:
+        images, lost: Images from the first fault on, and those of them without a pose.
+        again_s: Time from the last fault's end to the first pose after it [s]; NaN without one.
+        step_m, step_sigmas: Largest change of the error from pose to pose [m], and the largest by
+            the stated deviation of the later one.
+        off_m: Largest growth of the error of a pose that was given out [m].
+        silent_s: Longest time for which poses were silently wrong [s].
+        error: Last line of a traceback; empty without one.
+    """
+
+    images: int
+    lost: int
+    again_s: float
+    step_m: float
+    step_sigmas: float
+    off_m: float
+    silent_s: float
+    error: str = ""
+
+
+def stored(recording: Recording, faults: Sequence[Fault]) -> RobotRecording[Any]:
+    """The faulty robot's part of a recording that was made without faults."""
+    part: Any = recording.mav if faults[0].robot == "mav" else recording.ground
+    frames = FaultyFrames.of(part.camera_stamps, faults)
+
+    def read(index: int) -> MavImage | GroundImage:
+        image, stamp = part.read_image(int(frames.taken[index])), int(frames.stamps_ns[index])
+        if isinstance(image, MavImage):
+            return MavImage(stamp, frames.image(index, image.image))
+        depth = image.depth if frames.depth[index] else np.full_like(image.depth, np.nan)
+        return GroundImage(stamp, frames.image(index, image.colour), depth)
+
+    imu = faulty_imu(part.imu, faults)
+    stamps = frames.stamps_ns
+    return replace(part, camera_stamps=stamps, imu=imu, magnetic=None, read_image=read)
+
+
+@contextmanager
+def drawn(flight: Flight) -> Iterator[tuple[RobotRecording[Any], Truth]]:
+    """The ground robot's part of a flight, and the truth, rendered as it is read."""
+    with rendered(flight, 1) as recording:
+        yield recording.ground, Truth.open(recording.path)
+
+
+def tracked(part: RobotRecording[Any], until_ns: int, seed: int = 0) -> list[TrackedPose]:
+    """The pose of every image up to a time."""
+    table: Any = MAV if part.robot == Source.MAV else GROUND
+    given = Ingredients(part.calibration, Config(), np.random.default_rng(seed))
+    front_end = make_front_end(table, "slam", given)
+    poses = []
+    for stamped in part.messages():
+        if isinstance(stamped.message, ImuSamples):
+            front_end.add_imu(stamped.message)
+        elif isinstance(stamped.message, MavImage | GroundImage):
+            if stamped.message.stamp_ns > until_ns:
+                break
+            poses.append(front_end.track(stamped.message))
+    front_end.finish()
+    return poses
+
+
+def outcome(part: RobotRecording[Any], truth: Truth, faults: Sequence[Fault]) -> Outcome:
+    """Track a robot through its faults and hold its poses against the truth."""
+    ahead_ns = sum(round(fault.strength * 1e9) for fault in faults if fault.kind == "clock")
+    start_ns = min(fault.start_ns for fault in faults)
+    end_ns = max(fault.end_ns for fault in faults)
+    try:
+        poses = tracked(part, end_ns + ahead_ns + round(AFTER_S * 1e9))
+    except Exception as error:  # what it is, is the result
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        said = f"{type(error).__name__} at {Path(place.filename).name}:{place.lineno}"
+        return Outcome(0, 0, np.nan, np.nan, np.nan, np.nan, np.nan, said)
+    return _judged(poses, truth, faults[0].robot, start_ns, end_ns, ahead_ns)
+
+
+def _judged(
+    poses: Sequence[TrackedPose],
+    truth: Truth,
+    robot: Any,
+    start_ns: int,
+    end_ns: int,
+    ahead_ns: int,
+) -> Outcome:
+    def taken(pose: TrackedPose) -> int:
+        return pose.stamp_ns - (ahead_ns if pose.stamp_ns >= start_ns + ahead_ns else 0)
+
+    def true(pose: TrackedPose) -> SE3:
+        return truth.T_world_camera(robot, taken(pose))
+
+    known = [pose for pose in poses if pose.tracking is Tracking.TRACKED]
+    before = [pose for pose in known if taken(pose) < start_ns]
+    after = [pose for pose in poses if taken(pose) >= start_ns]
+    assert before, "the fault began before the robot had a map"
+    assert before[-1].T_map_camera is not None
+    T_map_world = before[-1].T_map_camera @ true(before[-1]).inverse()
+    last = np.zeros(3)
+    step, sigmas, off, silent_s, silent_since = 0.0, 0.0, 0.0, 0.0, None
+    for pose in after:
+        if pose.T_map_camera is None:
+            silent_since = None
+            continue
+        error = pose.T_map_camera.translation - (T_map_world @ true(pose)).translation
+        sigma = np.inf if pose.covariance is None else np.sqrt(np.trace(pose.covariance[:3, :3]))
+        change = float(np.linalg.norm(error - last))
+        step, sigmas = max(step, change), max(sigmas, change / sigma)
+        size, last = float(np.linalg.norm(error)), error
+        off = max(off, size)
+        if size > max(SILENT_M, SILENT_SIGMAS * sigma):
+            silent_since = pose.stamp_ns if silent_since is None else silent_since
+            silent_s = max(silent_s, (pose.stamp_ns - silent_since) * 1e-9 + 1 / 30)
+        else:
+            silent_since = None
+    again = [taken(pose) for pose in after if pose.T_map_camera is not None]
+    again = [stamp for stamp in again if stamp >= end_ns]
+    again_s = (again[0] - end_ns) * 1e-9 if again else np.nan
+    lost = sum(pose.T_map_camera is None for pose in after)
+    return Outcome(len(after), lost, again_s, step, sigmas, off, silent_s)
