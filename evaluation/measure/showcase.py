@@ -131,7 +131,10 @@ class Showcase:
         except (*UNREADABLE_ARRAYS, TypeError) as error:
             raise InputError(f"{path}: no readable showcase ({error})") from error
         clouds = {name: read_ply(folder / file)[0] for name, file in CLOUDS.items()}
-        return cls(**members | clouds)
+        try:
+            return cls(**members | clouds)
+        except ValueError as error:
+            raise InputError(f"{path}: no readable showcase ({error})") from None
 
 
 def _flat(name: str, value: Any) -> dict[str, NDArray]:
