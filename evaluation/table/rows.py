@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from pyarrow import ArrowException
 
 from airground.errors import InputError
 from airground.io.input_files import check_file
@@ -120,7 +121,9 @@ class ResultTable:
             raise InputError(f"{path}: no readable results table ({error})") from error
         try:
             table = cls(frame)
-        except (TypeError, ValueError, OverflowError, MemoryError) as error:
+            for name in (name for name, kind in _DTYPES.items() if kind == "string"):
+                table.frame[name].unique().tolist()  # decodes the texts, which may be damaged
+        except (TypeError, ValueError, OverflowError, MemoryError, ArrowException) as error:
             raise InputError(f"{path}: a column has values of a wrong type ({error})") from None
         table.check_once(str(path))
         return table
