@@ -132,7 +132,7 @@ class Render(Verb):
     """robot whose images are rendered"""
     every: Annotated[int, Shown("N")] = 1
     """every so many-th image or scan; flow leads to the next of all images"""
-    beams: Annotated[int, Shown("N")] = 32
+    beams: Annotated[int | None, Shown("N", "32")] = None
     """beams of the lidar, 16 to 128"""
     out: Annotated[Path | None, Shown("DIR", "truth/ in the recording")] = None
     """folder for ROBOT_depth/, ground_lidar/ and so on; these must not exist"""
@@ -155,9 +155,11 @@ class Render(Verb):
         every = int(in_range("--every", self.every, low=1))
         added = parse_modalities(self.add)
         wanted = Wanted(robots, tuple(name for name in added if name != LIDAR), every)
-        lidar = Lidar(beams=self.beams)
         if LIDAR in added and "ground" not in robots:
             raise InputError("--add lidar: the ground robot carries it; give no --robot mav")
+        if self.beams is not None and LIDAR not in added:
+            raise InputError("--beams: only with --add lidar")
+        lidar = Lidar() if self.beams is None else Lidar(beams=self.beams)
         simulated = Simulated.open(self.recording)
         out = simulated.truth.folder if self.out is None else self.out
         if wanted.modalities:

@@ -71,10 +71,19 @@ class Subject:
     weight: int = 1
 
 
+BODY = """
+[[bodies]]
+name = "walker"
+start_s = 2.0
+speed_mps = 0.8
+waypoints = [[-1.0, 2.0], [1.0, 2.0], [1.5, -2.0]]
+"""
+
+
 def make_scenes(folder: Path) -> None:
-    for name in ("flat", "tiny", "outdoor", "paper_b"):
+    for name in ("flat", "tiny", "outdoor", "paper_b", "warehouse", "collapsed", "street"):
         text = resources.files("scenes").joinpath(f"{name}.toml").read_text(encoding="utf-8")
-        (folder / f"{name}.toml").write_text(text)
+        (folder / f"{name}.toml").write_text(text + (BODY if name == "tiny" else ""))
 
 
 def read_scenes(folder: Path, out: Path) -> None:

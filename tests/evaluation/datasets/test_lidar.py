@@ -102,6 +102,7 @@ def seeds(simulated: Simulated) -> tuple[int, int]:
     [
         (("--add", "lidar", "--beams", "8"), "beams must be from 16 to 128, got 8"),
         (("--add", "lidar", "--robot", "mav"), "the ground robot carries it"),
+        (("--add", "depth", "--beams", "64"), "--beams: only with --add lidar"),
         (("--add", "radar"), "known: depth, normals, segmentation, flow, lidar"),
     ],
 )
