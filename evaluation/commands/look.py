@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, create_mutex_group
 
 from airground.errors import AirgroundError, InputError
 from evaluation.commands.options import OutOption, Shown, Verb
+from evaluation.commands.results import ACCEPTED
 
 IN_PLACE_OF_A_WINDOW = create_mutex_group(required=False)
+MOST_RUNS = 2
 
 if TYPE_CHECKING:
     from evaluation.measure.showcase import Showcase
@@ -21,11 +26,12 @@ if TYPE_CHECKING:
 class View(Verb):
     """Look into a run with rerun: in a window, a browser, or as a file.
 
-    Everything listens on this machine only; over SSH, forward the ports that --serve names.
+    Two runs over one recording are drawn on one clock, from the first difference on, which a table
+    names. Everything listens on this machine only; over SSH, forward the ports that --serve names.
     """
 
-    run: Annotated[Positional[Path], Shown("RUN")]
-    """folder that run --rerun has written, or its run.rrd"""
+    runs: Annotated[Positional[tuple[Path, ...]], Shown("RUN [RUN]")]
+    """folder that run --rerun has written, or its run.rrd; two to compare them"""
     serve: Annotated[bool, IN_PLACE_OF_A_WINDOW] = False
     """serve the viewer for a browser, until Ctrl-C"""
     save: Annotated[Path | None, IN_PLACE_OF_A_WINDOW, Shown("FILE")] = None
@@ -34,16 +40,25 @@ class View(Verb):
     def main(self) -> None:
         from evaluation.show.rerun_view import viewer
 
-        file = rerun_file(self.run)
-        viewer.verify(file)
+        files = rerun_files(self.runs)
+        for file in files:
+            viewer.verify(file)
+        if self.save is not None:
+            viewer.check_new(self.save)
+        elif not self.serve and not viewer.has_screen():
+            raise InputError(
+                "no screen here: --serve shows it in a browser, --save FILE takes it elsewhere"
+            )
+        with together(self.runs, files) as shown:
+            self._show(shown)
+
+    def _show(self, file: Path) -> None:
+        from evaluation.show.rerun_view import viewer
+
         if self.save is not None:
             viewer.save(file, self.save)
         elif self.serve:
             self._serve(file)
-        elif not viewer.has_screen():
-            raise InputError(
-                "no screen here: --serve shows it in a browser, --save FILE takes it elsewhere"
-            )
         else:
             _check_end(viewer.show(file))
 
@@ -58,9 +73,53 @@ class View(Verb):
             _check_end(server.wait())
 
 
+@contextmanager
+def together(runs: Sequence[Path], files: Sequence[Path]) -> Iterator[Path]:
+    """The file to show: that of the only run, or one of both, whose first differences are printed.
+
+    Raises:
+        InputError: Two runs cannot be held against each other.
+    """
+    if len(files) == 1:
+        yield files[0]
+        return
+    from evaluation.judge.accepted import Accepted
+    from evaluation.judge.divergence import Limits, hold
+    from evaluation.judge.runs import distinct_names
+    from evaluation.setup.progress import step
+    from evaluation.show.rerun_view.differences import print_differences
+    from evaluation.show.rerun_view.trace import RunFile, check_comparable, read_traces
+    from evaluation.show.rerun_view.two_runs import write_both
+
+    first, second = map(RunFile.open, files, distinct_names(runs))
+    check_comparable(first, second)
+    limits = Limits.of(Accepted.read(ACCEPTED).measured())
+    with TemporaryDirectory(prefix="airground-view-") as folder:
+        both = Path(folder) / "two_runs.rrd"
+        with step("comparing the runs"):
+            helds = hold(*read_traces(first, second), limits)
+            write_both(first, second, helds, both)
+        print_differences(helds, first.name, second.name)
+        yield both
+
+
 def _check_end(code: int) -> None:
     if code:
         raise AirgroundError(f"the viewer ended with exit code {code}")
+
+
+def rerun_files(runs: Sequence[Path]) -> list[Path]:
+    """The .rrd files of one run, or of two different ones.
+
+    Raises:
+        InputError: There are more or none, one twice, or one without a file.
+    """
+    if not 1 <= len(runs) <= MOST_RUNS:
+        raise InputError(f"{len(runs)} runs given; expected one RUN, or two over one recording")
+    files = [rerun_file(run) for run in runs]
+    if len({file.resolve() for file in files}) < len(files):
+        raise InputError(f"{runs[0]}: given twice; give two different runs")
+    return files
 
 
 def rerun_file(run: Path) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -11,6 +12,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from matplotlib.colors import to_rgb
+from rerun.chunk import Chunk
 
 from airground.core.cloud import Source
 from airground.core.se3 import SE3
@@ -62,6 +64,10 @@ class SensorStream:
     def log_always(self, entity: str, *what: rr.AsComponents) -> None:
         """Set an entity for all times."""
         self._stream.log(entity, *what, static=True)
+
+    def send(self, chunks: Iterable[Chunk]) -> None:
+        """Add what was read from another file."""
+        rr.send_chunks(chunks, recording=self._stream)
 
     def put_in_frame(self, frame: str, *entities: str) -> None:
         """Give the coordinates of these entities a named frame."""

@@ -105,10 +105,7 @@ def save(file: Path, out: Path) -> None:
     Raises:
         InputError: `file` is no recording of rerun, or `out` exists or cannot be written.
     """
-    if out.exists():
-        raise InputError(f"--save {out}: exists already; name a new file, or remove this one")
-    if not out.parent.is_dir():
-        raise InputError(f"--save {out}: there is no folder {out.parent}")
+    check_new(out)
     partial = out.with_name(f".{out.name}.partial")
     try:
         _carry_out("rrd", "optimize", str(file), "-o", str(partial))
@@ -116,6 +113,14 @@ def save(file: Path, out: Path) -> None:
         partial.rename(out)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def check_new(out: Path) -> None:
+    """Raise InputError where a file to save exists already, or has no folder."""
+    if out.exists():
+        raise InputError(f"--save {out}: exists already; name a new file, or remove this one")
+    if not out.parent.is_dir():
+        raise InputError(f"--save {out}: there is no folder {out.parent}")
 
 
 def verify(file: Path) -> None:
