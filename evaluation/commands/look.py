@@ -49,7 +49,7 @@ class View(Verb):
             raise InputError(
                 "no screen here: --serve shows it in a browser, --save FILE takes it elsewhere"
             )
-        with together(self.runs, files) as shown:
+        with together(files) as shown:
             self._show(shown)
 
     def _show(self, file: Path) -> None:
@@ -74,7 +74,7 @@ class View(Verb):
 
 
 @contextmanager
-def together(runs: Sequence[Path], files: Sequence[Path]) -> Iterator[Path]:
+def together(files: Sequence[Path]) -> Iterator[Path]:
     """The file to show: that of the only run, or one of both, whose first differences are printed.
 
     Raises:
@@ -83,21 +83,19 @@ def together(runs: Sequence[Path], files: Sequence[Path]) -> Iterator[Path]:
     if len(files) == 1:
         yield files[0]
         return
-    from evaluation.judge.accepted import Accepted
-    from evaluation.judge.divergence import Limits, hold
     from evaluation.judge.runs import distinct_names
     from evaluation.setup.progress import step
-    from evaluation.show.rerun_view.differences import print_differences
-    from evaluation.show.rerun_view.trace import RunFile, check_comparable, read_traces
+    from evaluation.show.rerun_view.differences import hold_files, print_differences
+    from evaluation.show.rerun_view.run_view import RUN_FILE
+    from evaluation.show.rerun_view.trace import RunFile
     from evaluation.show.rerun_view.two_runs import write_both
 
-    first, second = map(RunFile.open, files, distinct_names(runs))
-    check_comparable(first, second)
-    limits = Limits.of(Accepted.read(ACCEPTED).measured())
+    named = [file.parent if file.name == RUN_FILE else file for file in files]
+    first, second = map(RunFile.open, files, distinct_names(named))
     with TemporaryDirectory(prefix="airground-view-") as folder:
         both = Path(folder) / "two_runs.rrd"
         with step("comparing the runs"):
-            helds = hold(*read_traces(first, second), limits)
+            helds = hold_files(first, second, ACCEPTED)
             write_both(first, second, helds, both)
         print_differences(helds, first.name, second.name)
         yield both

@@ -60,6 +60,7 @@ class Compare(OutOption, Verb):
         from evaluation.setup.progress import step
         from evaluation.show.comparison.page import PAGE, write_comparison
         from evaluation.show.comparison.verdict_table import conclusion
+        from evaluation.show.rerun_view.differences import print_worsened
 
         reference, *others = read_runs(self.runs)
         helds = [against(reference, run) for run in others]
@@ -67,6 +68,8 @@ class Compare(OutOption, Verb):
             write_comparison(folder, helds)
         for held in helds:
             print(f"{held.run.name} against {reference.name}: {conclusion(held.comparison)}")
+        for folder, held in zip(self.runs[1:], helds, strict=True):
+            print_worsened(held.comparison, self.runs[0], folder, ACCEPTED)
         print(self.out / PAGE)
 
 
@@ -100,6 +103,10 @@ class Check(Verb):
         after = Measured.of(read_table(self.results), before.condition)
         comparison = compare(before, after)
         verdict_table.print_comparison(comparison)
+        if self.against.is_dir():
+            from evaluation.show.rerun_view.differences import print_worsened
+
+            print_worsened(comparison, self.against, self.results, ACCEPTED)
         for file, written in (
             (self.markdown, verdict_table.markdown),
             (self.junit, verdict_table.junit),

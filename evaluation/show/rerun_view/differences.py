@@ -3,13 +3,60 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from rich.console import Console
 
-from evaluation.judge.divergence import Held, first_divergence
+from airground.errors import InputError
+from evaluation.judge.accepted import Accepted
+from evaluation.judge.divergence import Held, Limits, first_divergence, hold
+from evaluation.judge.verdict import Comparison, Judged
+from evaluation.judge.worsened import worsened
 from evaluation.setup.text import MISSING, TextTable, print_table
+from evaluation.show.rerun_view.run_view import RUN_FILE
+from evaluation.show.rerun_view.trace import RunFile, check_comparable, read_traces
+from evaluation.show.rerun_view.viewer import verify
 
+WORSE = ("metric", "change", "", "from [s]", "how much")
 HEADER = ("", "number", "from [s]", "how much", "small is up to")
+
+
+def hold_files(first: RunFile, second: RunFile, accepted: Path) -> list[Held]:
+    """Both runs, kind by kind, by limits of the accepted figures in a file.
+
+    Raises:
+        InputError: The runs cannot be held against each other.
+    """
+    check_comparable(first, second)
+    limits = Limits.of(Accepted.read(accepted).measured())
+    return hold(*read_traces(first, second), limits)
+
+
+def print_worsened(comparison: Comparison, reference: Path, run: Path, accepted: Path) -> None:
+    """Print since when a run differs, for each metric that got worse; nothing where not both
+    folders keep the same recording in rerun."""
+    files = [folder / RUN_FILE for folder in (reference, run)]
+    if not all(file.is_file() for file in files):
+        return
+    try:
+        for file in files:
+            verify(file)
+        first, second = (RunFile.open(file, file.parent.name) for file in files)
+        helds = hold_files(first, second, accepted)
+    except InputError:
+        return
+    if rows := [_worse_row(judged, held) for judged, held in worsened(comparison, helds)]:
+        title = f"since when it is worse: airground view {reference} {run}"
+        print_table(TextTable(WORSE, tuple(rows)), title, left=(0, 2, 4), compact=True)
+
+
+def _worse_row(judged: Judged, held: Held) -> tuple[str, ...]:
+    change = MISSING
+    if judged.compared is not None:
+        change = judged.metric.fine_text(judged.compared.effect.value, "+")
+    assert held.first is not None
+    when = seconds_text(held.first.stamp_ns)
+    return judged.metric.title, change, held.kind, when, held.first.how_much
 
 
 def print_differences(

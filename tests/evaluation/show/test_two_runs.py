@@ -1,7 +1,8 @@
-"""Two runs in one file: both are there, on one clock, told apart, and their difference is found."""
+"""Two runs in one file: both are there, on one clock, in two colours; their difference is found."""
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pytest
+import rerun as rr
 from rerun.chunk import RrdReader
 
 from airground.core.events import BeliefUpdated, MavTracked
@@ -19,11 +21,13 @@ from airground.io.tum import write_tum
 from airground.tracking import TrackedFrame
 from evaluation import cli
 from evaluation.run.onlooker import Seen
+from evaluation.setup import console
 from evaluation.show.rerun_view import viewer
 from evaluation.show.rerun_view.run_view import RunView
 from evaluation.show.rerun_view.trace import RunFile, read_traces
 from evaluation.show.rerun_view.two_runs import FIRST_COLOUR, SECOND_COLOUR, SHARED_TRUTH
 from evaluation.show.rerun_view.two_runs_layout import FROM_DIFFERENCE
+from tests.evaluation.judge.flights import make_results
 from tests.evaluation.show.scripted_run import (
     BELIEF,
     CLOUD,
@@ -272,6 +276,9 @@ def test_runs_that_cannot_be_compared_are_refused(
     view = RunView(tmp_path / "elsewhere.rrd", "another", LENSES, TRUTH)
     show(view, seen_events())
     view.close()
+    with rr.RecordingStream("other", recording_id="scripted") as stream:
+        stream.save(tmp_path / "other.rrd")
+        stream.log("somewhere", rr.Points3D([[0, 0, 0]]))
     assert "is a run over another" in refused([base, tmp_path / "elsewhere.rrd"])
     assert "has no truth" in refused([base, folders["untrue"]])
     assert "has no truth" in refused([folders["untrue"], base])
@@ -279,7 +286,16 @@ def test_runs_that_cannot_be_compared_are_refused(
     assert "3 runs given" in refused([base, again, folders["lifted"]])
     assert "0 runs given" in refused([])
     assert "no such folder" in refused([base, tmp_path / "missing"])
-    assert [path.name for path in tmp_path.iterdir()] == ["elsewhere.rrd"]
+    assert "holds no camera" in refused([base, tmp_path / "other.rrd"])
+    assert {path.name for path in tmp_path.iterdir()} == {"elsewhere.rrd", "other.rrd"}
+
+
+def test_files_are_named_by_their_folders(
+    folders: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = {name: folders[name] / "run.rrd" for name in ("base", "again")}
+    viewed(files, ("base", "again"), tmp_path / "both.rrd")
+    assert "again against base" in capsys.readouterr().out
 
 
 def test_two_runs_without_truth_have_no_panel_for_it(
@@ -289,3 +305,23 @@ def test_two_runs_without_truth_have_no_panel_for_it(
     read = ReadBack(viewed(plain, ("one", "two"), tmp_path / "both.rrd"))
     assert not any("/truth" in entity for entity in read.entities)
     assert "/second/curves/spread_m" in read.entities
+
+
+@pytest.mark.parametrize("other", ["again", "shifted"])
+def test_check_says_since_when_it_is_worse(
+    other: str, folders: dict[str, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    runs = []
+    for name, factors in (("base", {}), (other, {"error_m": 1.5})):
+        runs.append(tmp_path / name)
+        runs[-1].mkdir()
+        shutil.copy(folders[name] / "run.rrd", runs[-1])
+        make_results(range(10), factors).write(runs[-1] / "results.parquet")
+    code = cli.parse("check", [str(runs[1]), "--against", str(runs[0])]).main()
+    assert code == console.EXIT_WORSE
+    said = " ".join(capsys.readouterr().out.split())
+    assert ("since when it is worse" in said) == (other == "shifted")
+    assert ("belief 3.000 0.100 m apart" in said) == (other == "shifted")
+    (runs[0] / "run.rrd").write_bytes(b"RRF2 but not really")
+    assert cli.parse("check", [str(runs[1]), "--against", str(runs[0])]).main() == code
+    assert "since when" not in capsys.readouterr().out
