@@ -53,7 +53,13 @@ def spread_figure(spreads: PerSequence, colours: Sequence[str] = SERIES) -> Figu
 def _boxes_over_iterations(
     axes: Axes, values: PerSequence, colours: Sequence[str], title: str
 ) -> None:
-    draw_boxes(axes, {label: list(group.T) for label, group in values.items()}, colours)
+    most = max(group.shape[1] for group in values.values())
+    boxes = {
+        # A run with fewer aerial maps than another has no boxes at the end.
+        label: [*group.T, *(np.empty(0) for _ in range(most - group.shape[1]))]
+        for label, group in values.items()
+    }
+    draw_boxes(axes, boxes, colours)
     iteration_axis(axes, list(values.values()))
     axes.set_title(title, pad=TITLE_PAD_PT)
 

@@ -18,7 +18,10 @@ from evaluation.show.figures.fig05_15_augmented_map import as_believed, refineme
 from evaluation.show.figures.fig06_depth_maps import completeness, depth_maps_figure
 from evaluation.show.figures.fig07_height_maps import draw_grid, height_maps_figure
 from evaluation.show.figures.fig08_particles import ellipse_points, particles_figure
-from evaluation.show.figures.fig11_12_localization_error import localization_error_figure
+from evaluation.show.figures.fig11_12_localization_error import (
+    localization_error_figure,
+    spread_figure,
+)
 from evaluation.show.figures.fig13_14_refinement_error import (
     BeforeAfter,
     refinement_translation_figure,
@@ -277,3 +280,10 @@ def test_errors_below_the_limits_keep_the_limits_on_the_axis() -> None:
     boxes, near, _ = figure.axes
     assert boxes.get_ylim()[1] > 0.5
     assert len(near.get_xticks()) <= 14
+
+
+def test_runs_with_different_numbers_of_aerial_maps_stand_side_by_side() -> None:
+    errors = {"four": np.full((1, 4), 0.1), "five": np.full((1, 5), 0.1)}
+    near = localization_error_figure(errors).axes[1]
+    assert [len(line.get_xdata()) for line in near.lines[:2]] == [4, 5]  # type: ignore[arg-type]
+    assert spread_figure(errors).axes[0].get_xlim()[1] > 5
