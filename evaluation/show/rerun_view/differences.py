@@ -10,6 +10,7 @@ from rich.console import Console
 from airground.errors import InputError
 from evaluation.judge.accepted import Accepted
 from evaluation.judge.divergence import Held, Limits, first_divergence, hold
+from evaluation.judge.runs import distinct_names
 from evaluation.judge.verdict import Comparison, Judged
 from evaluation.judge.worsened import worsened
 from evaluation.setup.text import MISSING, TextTable, print_table
@@ -36,12 +37,12 @@ def print_worsened(comparison: Comparison, reference: Path, run: Path, accepted:
     """Print since when a run differs, for each metric that got worse; nothing where not both
     folders keep the same recording in rerun."""
     files = [folder / RUN_FILE for folder in (reference, run)]
-    if not all(file.is_file() for file in files):
+    if not all(file.is_file() for file in files) or files[0].samefile(files[1]):
         return
     try:
         for file in files:
             verify(file)
-        first, second = (RunFile.open(file, file.parent.name) for file in files)
+        first, second = map(RunFile.open, files, distinct_names([reference, run]))
         helds = hold_files(first, second, accepted)
     except InputError:
         return
