@@ -21,7 +21,7 @@ from sim.robots.motion import ROBOTS, Robot
 from sim.scene import Light, Scene, parse_scene
 from sim.sensors.presets import NONE
 from sim.world.world import build_world
-from tests.sim.small_flight import SCENE, few_stamps, plain_world
+from tests.sim.small_flight import SCENE, few_stamps, unpainted
 
 BODIES = """
 [[bodies]]
@@ -44,7 +44,7 @@ def moving() -> Scene:
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(recorder, "image_stamps", few_stamps)
-        patch.setattr(recorder, "build_world", plain_world)
+        patch.setattr(recorder, "painted", unpainted)
         out = tmp_path_factory.mktemp("moving") / "recording"
         yield record(moving(), 3, NONE, out, workers=1)
 

@@ -27,7 +27,7 @@ from sim.sensors.faults import (
 from sim.sensors.faulty_frames import FaultyFrames
 from sim.sensors.presets import NOMINAL, with_dropped, with_imu_gap
 from sim.world.world import build_world
-from tests.sim.small_flight import SCENE, few_stamps, plain_world
+from tests.sim.small_flight import SCENE, few_stamps, unpainted
 
 SMALL = parse_scene(SCENE, "small.toml")
 STAMPS = np.arange(100, dtype=np.int64) * 100_000_000
@@ -154,7 +154,7 @@ def test_a_carried_robot_goes_on_from_where_it_was_before(motion: Motion) -> Non
 def _small_recordings() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(recorder, "image_stamps", few_stamps)
-        patch.setattr(recorder, "build_world", plain_world)
+        patch.setattr(recorder, "painted", unpainted)
         yield
 
 

@@ -128,7 +128,7 @@ def test_a_thing_has_the_same_id_for_both_robots(recorded: Path) -> None:
 def test_a_missing_surface_of_the_mav_is_reported(recorded: Path, tmp_path: Path) -> None:
     copy = shutil.copytree(recorded, tmp_path / "copy")
     (copy / "truth/surface_mav.ply").unlink()
-    with pytest.raises(RecordingError, match=r"surface_mav\.ply: no readable mesh"):
+    with pytest.raises(RecordingError, match=r"surface_mav\.ply: cannot be read: No such file"):
         _ = Truth.open(copy).surface("mav").mesh
 
 

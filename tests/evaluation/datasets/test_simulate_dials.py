@@ -37,7 +37,7 @@ def test_a_recording_states_its_dials(tmp_path: Path) -> None:
     short = SCENE.replace("takeoff_s = 1.6", "takeoff_s = 0.2").replace("= 5.0\n", "= 3.4\n", 1)
     (tmp_path / "small.toml").write_text(short)
     words = ["simulate", str(tmp_path / "small.toml"), "--sensors", "none"]
-    words += ["--threads", "1", "--out", str(tmp_path / "out"), "--dial", "sensors.fisheye=1"]
+    words += ["--out", str(tmp_path / "out"), "--dial", "sensors.fisheye=1"]
     with pytest.raises(InputError, match="out of its range, 0 to 30 ms"):
         answer([*words, "--dial", "sensors.readout_ms=31"])
     assert answer([*words, "--dial", "sensors.readout_ms=12"]) in (None, 0)
