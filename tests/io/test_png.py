@@ -110,6 +110,18 @@ def test_a_flipped_bit_is_noticed(at: float) -> None:
         decode_png(bytes(packed))
 
 
+@pytest.mark.parametrize("place", [18, 24, 28, 30])  # width, bits, interlacing, checksum
+def test_a_changed_header_is_noticed(
+    tmp_path: Path, place: int, capfd: pytest.CaptureFixture
+) -> None:
+    packed = bytearray(by_hand(4, 2, zlib.compress(bytes(10))))
+    packed[place] ^= 1
+    (tmp_path / "a.png").write_bytes(packed)
+    with pytest.raises(RecordingError, match="its header has another checksum"):
+        read_grey(tmp_path / "a.png", 4, 2)
+    assert capfd.readouterr().err == ""  # libpng would print
+
+
 def test_data_without_their_end_are_noticed() -> None:
     """All rows are there, but not the checksum."""
     with pytest.raises(ValueError, match="wrong place"):

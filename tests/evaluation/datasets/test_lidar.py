@@ -19,9 +19,26 @@ from sim.sensors.lidar import Lidar
 EXACT = Lidar(noise_m=0.0)
 
 
-def scan(simulated: Simulated, lidar: Lidar, index: int = 5) -> tuple[np.ndarray, np.ndarray]:
-    """Points of a scan, and their places (N, 3) in the world, each by its own pose."""
+def fastest(simulated: Simulated, lidar: Lidar) -> int:
+    """Number of the scan during which the robot moves farthest."""
+    poses = simulated.truth.motion
+    starts_ns = scan_starts_ns(simulated.truth, lidar).tolist()
+    steps = [
+        (poses.pose("ground", start).inverse() @ poses.pose("ground", start + lidar.revolution_ns))
+        for start in starts_ns
+    ]
+    steps_m = [float(np.linalg.norm(step.translation)) for step in steps]
+    assert max(steps_m) > 0.02
+    return int(np.argmax(steps_m))
+
+
+def scan(
+    simulated: Simulated, lidar: Lidar, index: int | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points of a scan, by default of the fastest, and their places (N, 3) in the world, each by
+    its own pose."""
     truth = simulated.truth
+    index = fastest(simulated, lidar) if index is None else index
     start_ns = int(scan_starts_ns(truth, lidar)[index])
     points = lidar_scan(truth, lidar, start_ns, np.random.default_rng(1))
     T_body_lidar = lidar.mounting(truth.motion.ground.mounting.T_body_camera)
