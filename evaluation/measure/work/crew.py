@@ -4,25 +4,21 @@ from __future__ import annotations
 
 import logging
 import multiprocessing
-import os
-import signal
-import tempfile
-import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Self, TypeVar
 
 import dask
-from distributed import Client, KilledWorker, LocalCluster, Worker, WorkerPlugin, as_completed
+from distributed import Client, KilledWorker, LocalCluster, Worker, as_completed
 from distributed.comm import CommClosedError
 from distributed.security import Security
 
 from airground.errors import AirgroundError, InputError
 from evaluation.measure.work.batch_system import NO_DASHBOARD, batch_cluster
-from evaluation.setup.environment import hand_back_memory, prepare
+from evaluation.measure.work.prepared_worker import PreparedWorker
 from sim.interrupts import end_children
 
 Task = TypeVar("Task")
@@ -175,36 +171,6 @@ def _check(client: Client, where: str) -> None:
     for address, fault in client.run(unfit).items():
         if fault is not None:
             raise InputError(f"--cluster {where}: worker {address} {fault}")
-
-
-class PreparedWorker(WorkerPlugin):
-    """Sets a worker's number of threads before its first task imports libraries that read it.
-
-    Args:
-        threads: Cores that the worker may use.
-        scratch: Folder of its temporary files, from which the next run removes those of a killed
-            worker; None for the system's folder.
-    """
-
-    name = "airground"
-
-    def __init__(self, threads: int, scratch: str | None = None) -> None:
-        self.threads = threads
-        self.scratch = scratch
-
-    def setup(self, worker: Worker) -> None:
-        """As `WorkerPlugin.setup`; called in the worker."""
-        prepare(self.threads)
-        os.environ["LP_NUM_THREADS"] = str(self.threads)  # Mesa's software renderer
-        if self.scratch is not None:
-            tempfile.tempdir = self.scratch
-        if threading.current_thread() is threading.main_thread():
-            signal.signal(signal.SIGINT, signal.SIG_IGN)  # the main process handles Ctrl-C
-
-    def transition(self, key: Any, start: str, finish: str, **kwargs: Any) -> None:
-        """As `WorkerPlugin.transition`: returns the memory of a finished task to the system."""
-        if start == "executing":
-            hand_back_memory()
 
 
 def unfit(dask_worker: Worker) -> str | None:
