@@ -87,9 +87,11 @@ def run(command: Callable[[], int | None], verbose: bool = False) -> int:
         print_error("out of memory; a shorter recording or fewer --threads need less")
         return EXIT_ERROR
     except KeyboardInterrupt as interrupt:
-        print_error("terminated" if isinstance(interrupt, Terminated) else "interrupted")
-        return EXIT_INTERRUPTED
+        return _interrupted(interrupt)
     except Exception as error:
+        # An import of compiled code that is interrupted raises ImportError, from the interrupt.
+        if isinstance(error.__cause__, KeyboardInterrupt):
+            return _interrupted(error.__cause__)
         if isinstance(error, OSError) and error.errno is not None:
             print_error(describe(error))
             return EXIT_ERROR
@@ -97,6 +99,11 @@ def run(command: Callable[[], int | None], verbose: bool = False) -> int:
         return EXIT_INTERNAL
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+def _interrupted(interrupt: KeyboardInterrupt) -> int:
+    print_error("terminated" if isinstance(interrupt, Terminated) else "interrupted")
+    return EXIT_INTERRUPTED
 
 
 def print_error(message: str) -> None:

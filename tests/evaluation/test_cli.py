@@ -229,6 +229,15 @@ class TestRun:
         assert cleaned
         assert "interrupted" in one_error_line(capsys) or sent == signal.SIGTERM
 
+    def test_an_import_that_is_interrupted_is_no_internal_error(
+        self, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        def load() -> None:
+            raise ImportError("initialization failed") from KeyboardInterrupt()
+
+        assert console.run(load) == console.EXIT_INTERRUPTED
+        assert one_error_line(capsys) == "airground: error: interrupted"
+
     @pytest.mark.parametrize("verbose", [False, True])
     def test_an_internal_error_keeps_its_traceback(
         self,

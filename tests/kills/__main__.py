@@ -56,6 +56,8 @@ def kill_often(verb: str, words: tuple[str, ...], folder: Path, count: int, seed
         hits += code != 0
         for kind, names in vars(after).items():
             left[kind] += bool(names)
+        for one in after.temporary:
+            print(f"{verb}, {number.name}: left {one} in TMPDIR", file=sys.stderr, flush=True)
         faults += [f"{number.name}: process {one} stays" for one in after.processes]
         faults += [f"{number.name}: shared memory {one} stays" for one in after.shared]
         if code == 0 or verb not in RESUMING:

@@ -21,7 +21,8 @@ END_S = 20.0
 
 @dataclass(frozen=True)
 class Left:
-    """What a command left: processes, shared memory, temporary files, files beside its output."""
+    """What one kill left: processes, shared memory and temporary files that were not there
+    before, and files beside the output."""
 
     processes: tuple[str, ...] = ()
     shared: tuple[str, ...] = ()
@@ -70,7 +71,7 @@ class Command:
         Returns:
             Exit code, and what is left when all has ended.
         """
-        before = shared_names()
+        before, scratch = shared_names(), self.temporary()
         process = self.start()
         try:
             process.wait(after_s)
@@ -89,9 +90,14 @@ class Command:
         for pid in session(process.pid):
             os.kill(pid, signal.SIGKILL)
         shared = shared_names() - before
-        temporary = tuple(path.name for path in (self.folder / "tmp").iterdir())
+        temporary = self.temporary() - scratch
         beside = {path.name for path in self.folder.iterdir()} - {"tmp", "stderr", self.out}
-        return code, Left(processes, tuple(shared), temporary, tuple(beside))
+        return code, Left(processes, tuple(shared), tuple(temporary), tuple(beside))
+
+    def temporary(self) -> set[str]:
+        """Names in its folder of temporary files, which stay for its next run."""
+        folder = self.folder / "tmp"
+        return {path.name for path in folder.iterdir()} if folder.exists() else set()
 
     def whole(self) -> bool:
         return self.output().exists()
