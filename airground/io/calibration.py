@@ -13,6 +13,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 from airground.core.messages import ImuNoise, RobotCalibration
 from airground.core.se3 import FARTHEST_M, ROTATION_TOLERANCE, SE3
 from airground.io.lens import COEFFICIENTS, MAX_READOUT_S, Lens, Model, Undistortion
+from airground.io.registration import Registration
 
 Positive = Annotated[float, Field(gt=0)]
 Row = tuple[float, float, float, float]
@@ -51,6 +52,10 @@ def _is_zero(value: float) -> bool:
     return value == 0
 
 
+def _is_none(value: object) -> bool:
+    return value is None
+
+
 class CameraTable(Table):
     """A camera; integer pixel coordinates are pixel centres.
 
@@ -66,7 +71,7 @@ class CameraTable(Table):
     rate_hz: Positive
     time_offset_ns: int
     """What to add to a stamp of the camera to get the time on the IMU's clock [ns]."""
-    distortion_model: Annotated[Model | None, Field(exclude_if=lambda model: model is None)] = None
+    distortion_model: Annotated[Model | None, Field(exclude_if=_is_none)] = None
     distortion_coefficients: Annotated[
         tuple[float, ...], Field(exclude_if=lambda numbers: not numbers)
     ] = ()
@@ -134,12 +139,25 @@ class MagnetometerTable(Table):
 
 
 class DepthTable(Table):
-    """How depth is written in 16-bit PNG files; 0 is missing."""
+    """How depth is written in 16-bit PNG files; 0 is missing.
+
+    `camera` and `T_camera_depth` are left out where depth is registered to the colour camera: each
+    pixel's depth is that of the colour image's pixel."""
 
     units_per_m: Positive
     """PNG value of one metre of depth along the optical axis."""
     delay_ns: Annotated[int, Field(exclude_if=_is_zero)] = 0
     """Time of a depth image minus that of the colour image with the same stamp [ns]."""
+    T_camera_depth: Annotated[Pose | None, Field(exclude_if=_is_none)] = None
+    """Pose of the depth camera in the colour camera."""
+    camera: Annotated[CameraTable | None, Field(exclude_if=_is_none)] = None
+    """The depth camera, which has the clock of the colour camera."""
+
+    @model_validator(mode="after")
+    def _camera_with_its_pose(self) -> DepthTable:
+        if (self.camera is None) != (self.T_camera_depth is None):
+            raise ValueError("camera and T_camera_depth come together, or neither does")
+        return self
 
 
 class RobotTable(Table):
@@ -165,9 +183,16 @@ class RobotTable(Table):
 
 
 class GroundTable(RobotTable):
-    """The ground robot also has a depth camera, registered to the colour camera."""
+    """The ground robot also has a depth camera."""
 
     depth: DepthTable
+
+    def registration(self) -> Registration | None:
+        """Moves depth to the pixels of the colour camera; None where it is registered."""
+        camera, pose = self.depth.camera, self.depth.T_camera_depth
+        if camera is None or pose is None:
+            return None
+        return Registration(camera.lens(), self.camera.lens(), SE3.from_matrix(pose))
 
 
 class CalibrationTable(Table):

@@ -10,7 +10,9 @@ from typing import Protocol
 from airground.core.arrays import F32, U8
 from airground.core.camera import PinholeCamera
 from airground.errors import RecordingError
-from airground.io.images import read_colour, read_depth, read_grey
+from airground.io.images import depth_units, read_colour, read_depth, read_grey
+from airground.io.png_encoder import encode_png
+from airground.io.registration import Registration
 
 
 class ImageSource(Protocol):
@@ -21,7 +23,7 @@ class ImageSource(Protocol):
         ...
 
     def ground(self, index: int) -> tuple[U8, F32]:
-        """(height, width, 3) RGB and (height, width) depth [m], NaN where missing."""
+        """(height, width, 3) RGB and (height, width) depth of its pixels [m], NaN where missing."""
         ...
 
 
@@ -33,6 +35,7 @@ class ImageFiles:
         mav_files, ground_colour_files, ground_depth_files: Files in order of time.
         mav_camera, ground_camera: Cameras, whose size the images must have.
         depth_units_per_m: PNG value of one metre of depth.
+        registration: Moves depth to the colour camera's pixels; None where the files hold it so.
     """
 
     mav_files: tuple[Path, ...]
@@ -41,16 +44,27 @@ class ImageFiles:
     mav_camera: PinholeCamera
     ground_camera: PinholeCamera
     depth_units_per_m: float
+    registration: Registration | None = None
 
     def mav(self, index: int) -> U8:
         return read_grey(self.mav_files[index], self.mav_camera.width, self.mav_camera.height)
 
     def ground(self, index: int) -> tuple[U8, F32]:
         size = self.ground_camera.width, self.ground_camera.height
-        return (
-            read_colour(self.ground_colour_files[index], *size),
-            read_depth(self.ground_depth_files[index], *size, self.depth_units_per_m),
-        )
+        colour = read_colour(self.ground_colour_files[index], *size)
+        if self.registration is not None:
+            size = self.registration.depth_size
+        depth = read_depth(self.ground_depth_files[index], *size, self.depth_units_per_m)
+        if self.registration is not None:
+            depth = self.registration.registered(depth)
+        return colour, depth
+
+    def depth_png(self, index: int) -> bytes:
+        """A file of depth of the colour image's pixels, in the recording's unit: the recording's
+        own where it is registered."""
+        if self.registration is None:
+            return self.ground_depth_files[index].read_bytes()
+        return encode_png(depth_units(self.ground(index)[1], self.depth_units_per_m))
 
     def check_present(self) -> None:
         """Raises RecordingError naming the first file that is missing."""

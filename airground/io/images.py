@@ -55,6 +55,13 @@ def metric_depth(units: U16, units_per_m: float) -> F32:
     return depth
 
 
+def depth_units(depth: F32, units_per_m: float) -> U16:
+    """Values of a depth image of depth [m]; 0 for what is missing or too far for 16 bits."""
+    units = depth * np.float32(units_per_m)
+    fits = units <= np.iinfo(np.uint16).max  # false where NaN
+    return np.where(fits, np.rint(units), 0).astype(np.uint16)
+
+
 def warm_up_images() -> None:
     """Compile what reading images needs."""
     warm_up_decoding()

@@ -26,6 +26,7 @@ from airground.io.plausibility import (
     check_up_in_body,
     upwards,
 )
+from airground.io.registration import warm_up_registration
 from airground.io.robot_recording import Image, Pair, RobotRecording
 from airground.io.tum import read_associations
 
@@ -70,9 +71,12 @@ class Recording(Pair):
                 mav_camera=mav.camera.lens().pinhole(),
                 ground_camera=ground.camera.lens().pinhole(),
                 depth_units_per_m=ground.depth.units_per_m,
+                registration=ground.registration(),
             )
             images.check_present()
             warm_up_images()  # so that no image waits for the compiler
+            if images.registration is not None:
+                warm_up_registration()
         source = images
         of_mav, of_ground = Undistortion(mav.camera.lens()), Undistortion(ground.camera.lens())
 

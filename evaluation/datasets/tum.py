@@ -42,7 +42,9 @@ def write_tum_folder(folder: Path, simulated: Simulated, robots: tuple[Robot, ..
             f"files; TUM's format prescribes {DEPTH_UNITS_PER_M:g}"
         )
     copy_images(simulated.files.ground_colour_files, folder / "rgb")
-    copy_images(simulated.files.ground_depth_files, folder / "depth")
+    (folder / "depth").mkdir()
+    for index, file in enumerate(simulated.files.ground_depth_files):
+        (folder / "depth" / file.name).write_bytes(simulated.files.depth_png(index))
     for name in SAME_FILES:
         target = folder / Path(name).relative_to("ground")
         target.parent.mkdir(exist_ok=True)

@@ -84,7 +84,7 @@ def _samples(simulated: Simulated, robot: Robot) -> Iterator[Sample]:
         }
         content = {"grey.png" if robot == "mav" else "colour.png": images[index].read_bytes()}
         if robot == "ground":
-            content["depth.png"] = files.ground_depth_files[index].read_bytes()
+            content["depth.png"] = files.depth_png(index)
             depth = truth.calibration.ground.depth
             facts["depth_units_per_m"] = depth.units_per_m
             facts["depth_delay_ns"] = depth.delay_ns

@@ -11,25 +11,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.io import layout
-from airground.io.calibration import CalibrationTable, RobotTable
+from airground.io.calibration import CalibrationTable, GroundTable, RobotTable
 from airground.io.digests import bytes_digest
 from airground.io.lens import Lens
 from airground.io.png_encoder import encode_png
 from airground.io.recording_writer import ground_image_name, mav_image_name
 from sim.geometry.edges import Edges
 from sim.recording.carried_lamp import CarriedLamp
+from sim.recording.depth_camera import VIEW, DepthCamera, true_depth_camera
 from sim.recording.drone_shadow import DroneShadow
 from sim.recording.render import Renderer
 from sim.recording.robot_view import RobotView
 from sim.robots.motion import ROBOTS, Motion, Robot
 from sim.robots.moving_bodies import read_bodies
 from sim.sensors.camera import ImageSensor
-from sim.sensors.depth import kinect_depth
 from sim.sensors.faulty_frames import FaultyFrames
 from sim.sensors.pixel_rays import PixelRays
 from sim.sensors.presets import SensorPreset
-
-_PNG_MAX = 65535
 
 
 @dataclass(frozen=True)
@@ -52,6 +50,7 @@ class FramePlan:
         lamp: The lamp; None without one.
         shadows: The MAV's shadow in the light that each robot sees; none if it throws none.
         true: True calibration of the sensors.
+        driver: Nominal calibration by which depth is registered; None if it is not.
         taken_ns: Nominal stamps at which each robot's camera takes an image [ns].
         frames: The frames that are left of them by faults of the sensors.
     """
@@ -60,6 +59,7 @@ class FramePlan:
     worlds: dict[Robot, WorldFiles]
     motion: Path
     true: CalibrationTable
+    driver: GroundTable | None
     preset: SensorPreset
     seeds: tuple[int, int]
     taken_ns: dict[Robot, NDArray[np.int64]]
@@ -89,6 +89,7 @@ class FrameMaker:
     Attributes:
         views: What each robot's camera sees before its sensor's faults.
         rays: Where each camera's pixels look.
+        depth_camera: The ground robot's depth camera.
     """
 
     def __init__(self, plan: FramePlan) -> None:
@@ -108,6 +109,7 @@ class FrameMaker:
             self._renderers.append(_renderer(plan.unlit))
             of_drive = edges[plan.worlds["ground"]]
             self._unlit = self._view("ground", self._renderers[-1], of_drive, None)
+        self.depth_camera = self._depth_camera(renderers, edges)
         self.rays = {robot: PixelRays.of(self._lens(robot)) for robot in ROBOTS}
         self._sensors: dict[Robot, ImageSensor] = {}
         if plan.preset.image is not None:
@@ -151,13 +153,8 @@ class FrameMaker:
             colour = self._plan.lamp.lit(colour, unlit, depth, self._lens("ground").rays())
         if "ground" in self._sensors:
             colour = self.expose("ground", colour, depth, time_ns, rng)
-        delay_ns = self._plan.true.ground.depth.delay_ns
-        if delay_ns:
-            depth = self.views["ground"].depth(time_ns + delay_ns)
-        if self._plan.preset.depth is not None:
-            depth = kinect_depth(depth, self.rays["ground"], self._plan.preset.depth, rng)
         frames = self._plan.frames["ground"]
-        units = frames.depth_units(index, self._depth_units(depth))
+        units = frames.depth_units(index, self.depth_camera.units(time_ns, depth, rng))
         return frames.image(index, colour), units
 
     def start(self, robot: Robot, index: int) -> tuple[int, np.random.Generator]:
@@ -176,6 +173,18 @@ class FrameMaker:
         motion, bodies = self._motion, self._bodies
         return RobotView(robot, lens, motion, renderer, edges, grey, bodies, shadow)
 
+    def _depth_camera(
+        self, renderers: dict[WorldFiles, Renderer], edges: dict[WorldFiles, Edges]
+    ) -> DepthCamera:
+        true, view = self._plan.true.ground, self.views["ground"]
+        if true.depth.camera is not None:
+            files = self._plan.worlds["ground"]
+            camera, T_camera_depth = true_depth_camera(true)
+            motion = self._motion.with_camera_moved("ground", T_camera_depth)
+            drawing = motion, renderers[files], edges[files]
+            view = RobotView("ground", camera.lens(), *drawing, True, self._bodies, name=VIEW)
+        return DepthCamera(true, self._plan.driver, self._plan.preset.depth, view)
+
     def expose(
         self, robot: Robot, sharp: NDArray, depth: NDArray, time_ns: int, rng: np.random.Generator
     ) -> NDArray[np.uint8]:
@@ -185,12 +194,6 @@ class FrameMaker:
         start = self._motion.camera_pose(robot, time_ns - half_ns)
         T_start_end = start.inverse() @ self._motion.camera_pose(robot, time_ns + half_ns)
         return sensor.expose(sharp, depth, T_start_end, time_ns * 1e-9, rng)
-
-    def _depth_units(self, depth: NDArray[np.float32]) -> NDArray[np.uint16]:
-        """PNG values by the true scale; what is missing or too far for 16 bits is 0."""
-        units = depth * np.float32(self._plan.true.ground.depth.units_per_m)
-        fits = units <= _PNG_MAX  # false where NaN
-        return np.where(fits, np.rint(units), 0).astype(np.uint16)
 
     def _write(self, folder: str, name: str, image: NDArray) -> Written:
         data = encode_png(image)

@@ -23,10 +23,12 @@ from airground.io.header import FrameCounts, Header
 from airground.io.images import metric_depth
 from airground.io.lens import Lens
 from airground.io.recording import Recording
+from airground.io.registration import Registration
 from sim.geometry.edges import find_edges
 from sim.partial_folder import partial_folder
 from sim.recording.bodies_in_view import add_bodies
 from sim.recording.carried_lamp import CarriedLamp
+from sim.recording.depth_camera import depth_tiles
 from sim.recording.drone_shadow import DroneShadow
 from sim.recording.frame_pool import FrameServer, FrameWorkers, frame_workers, make_frames
 from sim.recording.frames import FramePlan, WorldFiles
@@ -145,8 +147,11 @@ def rendered(flight: Flight, workers: int) -> Iterator[Recording]:
             store_models(plan, plain)
         except OSError as error:
             raise AirgroundError(f"{root}: the flight cannot be prepared there: {error}") from None
-        depth_units_per_m = header.calibration.ground.depth.units_per_m
-        yield Recording.open(folder, _DrawnImages(FrameServer(plan, pool), depth_units_per_m))
+        ground = header.calibration.ground
+        images = _DrawnImages(
+            FrameServer(plan, pool), ground.depth.units_per_m, ground.registration()
+        )
+        yield Recording.open(folder, images)
 
 
 @dataclass(frozen=True)
@@ -155,13 +160,15 @@ class _DrawnImages:
 
     frames: FrameServer
     depth_units_per_m: float
+    registration: Registration | None
 
     def mav(self, index: int) -> NDArray[np.uint8]:
         return self.frames.mav(index)
 
     def ground(self, index: int) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
         colour, depth_units = self.frames.ground(index)
-        return colour, metric_depth(depth_units, self.depth_units_per_m)
+        depth = metric_depth(depth_units, self.depth_units_per_m)
+        return colour, depth if self.registration is None else self.registration.registered(depth)
 
 
 def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan, World]:
@@ -201,6 +208,7 @@ def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan,
         worlds=_world_files(root, one=flown is world),
         motion=root / "truth/motion.npz",
         true=sensors.true,
+        driver=sensors.driver,
         preset=preset,
         seeds=seeds,
         taken_ns=taken,
@@ -251,6 +259,7 @@ def _store_model(plan: FramePlan, files: WorldFiles, world: World) -> None:
         "ground": plan.true.ground.camera.lens(),
     }
     tiles = [tile for robot, lens in lenses.items() for tile in tiles_of(robot, lens)]
+    tiles += depth_tiles(plan.true.ground)
     cameras = {tile.name: tile.camera for tile in tiles}
     spec = world.spec.copy()
     add_bodies(spec, read_bodies(plan.motion.parent), None if files == plan.unlit else light)

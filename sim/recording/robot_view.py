@@ -44,6 +44,7 @@ class RobotView:
         grey: Whether pictures have one channel in place of three.
         bodies: Bodies of the recording, which the renderer's world holds.
         shadow: The MAV's shadow, if it throws one.
+        name: Name of the camera's views in the world, if it is not the robot's.
     """
 
     def __init__(
@@ -56,12 +57,13 @@ class RobotView:
         grey: bool,
         bodies: Sequence[MovingBody] = (),
         shadow: DroneShadow | None = None,
+        name: str | None = None,
     ) -> None:
         self._robot, self._lens, self._motion = robot, lens, motion
         self._renderer, self._edges, self._grey = renderer, edges, grey
         self._shadow = shadow
         self._bodies = BodiesInView(robot, bodies)
-        self._tiles = tiles_of(robot, lens)
+        self._tiles = tiles_of(name or robot, lens)
         self._rays = None if is_plain(lens) else lens.rays()
 
     def draw(self, time_ns: int) -> Drawn:

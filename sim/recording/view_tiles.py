@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.io.lens import Lens
-from sim.robots.motion import Robot
 
 MAX_STRIP_S = 0.005
 """Longest readout of one strip [s]. Within half of it the MAV moves by 1.3 mm: an edge at 1 m is
@@ -58,16 +57,16 @@ def is_plain(lens: Lens) -> bool:
     return not lens.bends and lens.readout_s == 0
 
 
-def tiles_of(robot: Robot, lens: Lens) -> list[Tile]:
-    """The tiles of a robot's camera: those with the fewest pixels to draw."""
+def tiles_of(camera: str, lens: Lens) -> list[Tile]:
+    """The tiles of a camera of this name: those with the fewest pixels to draw."""
     if is_plain(lens):
         whole = slice(0, lens.height), slice(0, lens.width)
-        return [Tile(robot, *whole, lens.pinhole(), SE3.identity())]
+        return [Tile(camera, *whole, lens.pinhole(), SE3.identity())]
     strips = max(int(np.ceil(lens.readout_s / MAX_STRIP_S)), 1)
     splits = {(across, max(down, strips)) for across, down in SPLITS if lens.bends or across == 1}
     rays = lens.rays()
     choices = [
-        _split(robot, lens, rays, *split, turned)
+        _split(camera, lens, rays, *split, turned)
         for split in sorted(splits)
         for turned in (False, True)
     ]
@@ -79,7 +78,7 @@ def _cost(tiles: list[Tile]) -> float:
 
 
 def _split(
-    robot: Robot, lens: Lens, rays: NDArray, across: int, down: int, turned: bool
+    name: str, lens: Lens, rays: NDArray, across: int, down: int, turned: bool
 ) -> list[Tile]:
     """Tiles whose views look towards their middles if `turned`, else along the optical axis."""
     rows = np.linspace(0, lens.height, down + 1).round().astype(int)
@@ -91,7 +90,7 @@ def _split(
             spare_rad = MAX_TURN_RATE * lens.readout_s * (bottom - top) / lens.height / 2
             T_camera_view = _towards(rays[place]) if turned else SE3.identity()
             camera = _camera_over(rays, place, T_camera_view, float(spare_rad))
-            tiles.append(Tile(f"{robot}/{len(tiles)}", *place, camera, T_camera_view))
+            tiles.append(Tile(f"{name}/{len(tiles)}", *place, camera, T_camera_view))
     return tiles
 
 

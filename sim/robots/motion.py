@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -76,6 +76,14 @@ class Motion:
             ValueError: The time lies outside.
         """
         return self.pose(robot, stamp_ns) @ self.robot(robot).mounting.T_body_camera
+
+    def with_camera_moved(self, robot: Robot, T_camera_eye: SE3) -> Motion:
+        """The same motion with a robot's camera at another place, given in the camera's frame."""
+        states = self.robot(robot)
+        mounted = states.mounting
+        moved = replace(mounted, T_imu_camera=mounted.T_imu_camera @ T_camera_eye)
+        states = replace(states, mounting=moved)
+        return replace(self, mav=states) if robot == "mav" else replace(self, ground=states)
 
     def save(self, path: Path) -> None:
         """Write an `.npz` without pickles; the same motion gives the same bytes."""

@@ -19,6 +19,7 @@ from sim.sensors.presets import DepthNoise
 
 BASELINE_M = 0.075
 INFRARED_FOCAL_PX = 585.0
+"""Focal length of the depth camera [px]."""
 _CORRELATION_PX = 1.0  # the matching window correlates neighbouring errors
 _PATCH_PX = 16  # whole patches of a surface seen at a grazing angle vanish together
 

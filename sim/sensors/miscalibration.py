@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from airground.io.calibration import (
     pose_rows,
 )
 from sim.robots.robot_motion import Mounting
+from sim.sensors.depth import INFRARED_FOCAL_PX
 from sim.sensors.optics import EUROC_RADTAN, KINECT_RADTAN, misjudged
 from sim.sensors.presets import ADIS16448, NOMINAL, CalibrationErrors, ImuNoise, SensorPreset
 
@@ -32,10 +34,14 @@ DEPTH_UNITS_PER_M = 5000.0
 
 @dataclass(frozen=True)
 class Calibrations:
-    """True calibration of the sensors, and the nominal one that the recording states."""
+    """True calibration of the sensors, and the nominal one that the recording states.
+
+    `driver` is the nominal one by which the Kinect's driver registers depth, which the recording
+    does not need to state then; None where it does not."""
 
     true: CalibrationTable
     nominal: CalibrationTable
+    driver: GroundTable | None = None
 
 
 def calibrate(
@@ -92,15 +98,39 @@ def calibrate(
         tables.append((true, nominal))
     scale = 1 + signs[4] * errors.depth_scale
     (mav_true, mav_nominal), (ground_true, ground_nominal) = tables
+    delay_ns, has_camera = preset.depth_delay_ns, preset.depth_baseline_m > 0
+    depth_true = DepthTable(units_per_m=DEPTH_UNITS_PER_M * scale, delay_ns=delay_ns)
+    registered = DepthTable(units_per_m=DEPTH_UNITS_PER_M, delay_ns=delay_ns)
+    measured = registered
+    if has_camera:
+        cameras = _depth_cameras(preset, ground_true.camera, errors, rng)
+        depth_true, measured = (
+            DepthTable(**dict(table) | camera)
+            for table, camera in zip((depth_true, registered), cameras, strict=True)
+        )
+    driven = has_camera and preset.depth_registered
+    stated = registered if driven else measured
     return Calibrations(
-        CalibrationTable(
-            mav=mav_true,
-            ground=_with_depth(ground_true, DEPTH_UNITS_PER_M * scale, preset.depth_delay_ns),
-        ),
-        CalibrationTable(
-            mav=mav_nominal,
-            ground=_with_depth(ground_nominal, DEPTH_UNITS_PER_M, preset.depth_delay_ns),
-        ),
+        CalibrationTable(mav=mav_true, ground=GroundTable(**dict(ground_true), depth=depth_true)),
+        CalibrationTable(mav=mav_nominal, ground=GroundTable(**dict(ground_nominal), depth=stated)),
+        GroundTable(**dict(ground_nominal), depth=measured) if driven else None,
+    )
+
+
+def _depth_cameras(
+    preset: SensorPreset, colour: CameraTable, errors: CalibrationErrors, rng: np.random.Generator
+) -> tuple[dict[str, Any], dict[str, Any]]:
+    """True and nominal camera and pose of a depth camera of its own. Its rows are read as those of
+    the colour camera are, and by the same clock; its lens has no distortion."""
+    sign, axis = rng.choice([-1.0, 1.0]), rng.standard_normal(3)
+    shutter = {"readout_s": colour.readout_s, "time_offset_ns": colour.time_offset_ns}
+    true = _camera(GROUND_IMAGE_PX, INFRARED_FOCAL_PX).model_copy(update=shutter)
+    nominal = misjudged(true, 1 + sign * errors.focal, 1.0)
+    T_camera_depth = SE3(np.eye(3), np.array([-preset.depth_baseline_m, 0.0, 0.0]))
+    turn = SE3.from_rotation_vector(errors.camera_to_imu * axis / np.linalg.norm(axis))
+    return (
+        {"camera": true, "T_camera_depth": pose_rows(T_camera_depth)},
+        {"camera": nominal, "T_camera_depth": pose_rows(T_camera_depth @ turn)},
     )
 
 
@@ -117,10 +147,6 @@ def _camera(size: tuple[int, int], focal_px: float) -> CameraTable:
         rate_hz=CAMERA_RATE_HZ,
         time_offset_ns=0,
     )
-
-
-def _with_depth(robot: RobotTable, units_per_m: float, delay_ns: int) -> GroundTable:
-    return GroundTable(**dict(robot), depth=DepthTable(units_per_m=units_per_m, delay_ns=delay_ns))
 
 
 def _imu_table(noise: ImuNoise | None) -> ImuTable:

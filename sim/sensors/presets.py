@@ -121,6 +121,11 @@ class SensorPreset:
     Attributes:
         mav_optics, ground_optics: Lens and shutter of the MAV's and the ground robot's camera.
         depth_delay_ns: Time from a colour image to the depth image with its stamp [ns].
+        depth_baseline_m: Distance of the depth camera, to the left of the colour camera [m]; 0 is
+            depth measured in the colour camera's own pixels.
+        depth_registered: Whether the driver moves depth to the colour camera's pixels, by the
+            nominal calibration; if not, depth is stored as it is measured. Without a baseline it
+            makes no difference.
         faults: Failures of single sensors, for a while.
     """
 
@@ -133,6 +138,8 @@ class SensorPreset:
     mav_optics: Optics = PINHOLE
     ground_optics: Optics = PINHOLE
     depth_delay_ns: int = 0
+    depth_baseline_m: float = 0.0
+    depth_registered: bool = True
     faults: tuple[Fault, ...] = ()
 
 
@@ -203,8 +210,10 @@ REAL = replace(
     ground_optics=Optics("radtan", readout_s=KINECT_READOUT_S),
     # The two cameras of a Kinect have no common trigger: half of a period of 30 Hz at most.
     depth_delay_ns=10_000_000,
+    depth_baseline_m=0.025,
 )
-"""The noise of `nominal`, with lenses and rolling shutters as consumer cameras have them."""
+"""The noise of `nominal`, with lenses, rolling shutters and a Kinect of two cameras, as consumer
+cameras have them."""
 
 PRESETS = {preset.name: preset for preset in (NONE, NOMINAL, HARSH, PAPER, REAL)}
 
@@ -246,6 +255,11 @@ def with_readout(preset: SensorPreset, readout_s: float) -> SensorPreset:
         mav_optics=replace(preset.mav_optics, readout_s=readout_s),
         ground_optics=replace(preset.ground_optics, readout_s=readout_s),
     )
+
+
+def with_depth_camera(preset: SensorPreset, **change: float | bool) -> SensorPreset:
+    """The preset with another `depth_baseline_m` or `depth_registered`."""
+    return replace(preset, **change)  # type: ignore[arg-type]
 
 
 def with_distortion(preset: SensorPreset, factor: float) -> SensorPreset:

@@ -13,6 +13,7 @@ from sim.appearance.other_light import later_light, light_between
 from sim.scene import MAX_HEAP_HEIGHT_M, Light, Scene
 from sim.sensors.presets import (
     SensorPreset,
+    with_depth_camera,
     with_distortion,
     with_dropped,
     with_fisheye,
@@ -144,6 +145,18 @@ DIALS = (
         lambda subject, value: replace(subject, sensors=with_distortion(subject.sensors, value)),
     ),
     Dial(
+        "sensors.depth_baseline_mm", "mm", 0.0, 100.0,
+        "distance of the Kinect's depth camera from its colour camera; 0 is depth measured in the "
+        "colour camera's own pixels",
+        lambda subject, value: _depth_camera(subject, depth_baseline_m=value / 1e3),
+    ),
+    Dial(
+        "sensors.depth_registered", "", 0.0, 1.0,
+        "1 if the Kinect's driver moves depth to the colour camera's pixels, 0 if depth is stored "
+        "as the depth camera measures it",
+        lambda subject, value: _depth_camera(subject, depth_registered=value >= 0.5),
+    ),
+    Dial(
         "sensors.dropped_s", "s", 0.0, 5.0,
         "time for which each robot's camera drops its images, once, at a time drawn by the seed",
         lambda subject, value: replace(subject, sensors=with_dropped(subject.sensors, value)),
@@ -236,6 +249,10 @@ def _part(subject: Subject, part: str, **change: float) -> Subject:
     if table is None:
         raise InputError(f"scene '{subject.scene.name}' has no [{part}] to change")
     return _scene(subject, **{part: table.model_copy(update=change)})
+
+
+def _depth_camera(subject: Subject, **change: float | bool) -> Subject:
+    return replace(subject, sensors=with_depth_camera(subject.sensors, **change))
 
 
 def _flight_light(scene: Scene, share: float) -> Light | None:

@@ -115,6 +115,8 @@ def test_dials_turn_what_they_name() -> None:
         "sensors.readout_ms": 20.0,
         "sensors.distortion": 0.5,
         "sensors.fisheye": 0.9,
+        "sensors.depth_baseline_mm": 50.0,
+        "sensors.depth_registered": 0.0,
         "sensors.dropped_s": 2.0,
         "sensors.imu_gap_s": 0.5,
         "sensors.heading_error_deg": 5.0,
@@ -138,6 +140,7 @@ def test_dials_turn_what_they_name() -> None:
     assert subject.sensors.image.read_noise == 2 * NOMINAL.image.read_noise  # type: ignore[union-attr]
     optics = subject.sensors.mav_optics, subject.sensors.ground_optics
     assert {(o.lens, o.distortion, o.readout_s) for o in optics} == {("equidistant", 0.9, 0.02)}
+    assert (subject.sensors.depth_baseline_m, subject.sensors.depth_registered) == (0.05, False)
     faults = [(fault.kind, fault.duration_s) for fault in subject.sensors.faults]
     assert faults == 2 * [("dropped", 2.0)] + 2 * [("imu_gap", 0.5)]
     # What is turned is still a valid scene.
