@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
@@ -23,8 +23,11 @@ from evaluation.commands.options import (
 )
 
 if TYPE_CHECKING:
+    from evaluation.measure.levels.level import Level
     from evaluation.measure.plans.reproduce import Plan
     from evaluation.measure.protocol.trials import Protocol
+    from evaluation.setup.setups import Setup
+    from sim.recording.recorder import Flight
 
 
 @dataclass(frozen=True)
@@ -102,6 +105,10 @@ class Reproduce(
     """one small scene and a short flight: minutes instead of hours"""
     suite: Annotated[Literal["fast"] | None, _SMALLER, Shown("fast")] = None
     """the fixed small suite for check, with the setup asked for only"""
+    level: Annotated[
+        Literal["paper", "easy", "medium", "hard", "extreme"] | None, _SMALLER, Shown("NAME")
+    ] = None
+    """a frozen level of difficulty (docs/levels.md), which fixes scenes, sensors and heading"""
     sensors: Annotated[
         Literal["none", "nominal", "harsh", "paper", "real"] | None,
         Shown("NAME", "nominal, or paper with --preset paper"),
@@ -130,7 +137,7 @@ class Reproduce(
         from evaluation.show.report.screen import print_summary
 
         plan = self.plan() if self.suite is None else self._suite(self.suite)
-        setup, seed = self.setup(), self.checked_seed()
+        setup, seed, level = plan.setups[0], self.checked_seed(), self._level()
         with (
             resumable_folder(self.out) as folder,
             Crew(self.cluster, self.workers(), plan.tasks(), folder.scratch) as crew,
@@ -141,7 +148,8 @@ class Reproduce(
             )
             recordings = self.recordings or folder.recordings
             found = plan.measured(None if self.render else recordings, folder.store, crew)
-            results = Results(found.table, setup.config, seed, found.showcase)
+            mark = None if level is None else level.mark
+            results = Results(found.table, setup.config, seed, found.showcase, level=mark)
             with step("writing the report"):
                 summary = write_results(results, folder.results)
         print_summary(summary)
@@ -161,31 +169,60 @@ class Reproduce(
 
     def plan(self) -> Plan:
         """What the words ask for, checked."""
-        from evaluation.measure.plans.reproduce import Plan, flights_over
+        from evaluation.measure.plans.reproduce import Plan
         from evaluation.setup.setups import with_companions
-        from sim.scene import load_scene
-        from sim.sensors.presets import sensor_preset
 
-        setup = self.setup()
+        level = self._level()
+        setup = self.setup() if level is None else self._setup_at(level)
         if self.budget and setup.poses != "slam":
             raise InputError("--budget asks what SLAM loses among others; give --poses slam")
-        extent = self._extent(setup.config.preset)
+        extent = self._extent(setup.config.preset, level)
+        setups = [setup] if self.alone else with_companions(setup, few=self.quick)
         return Plan(
-            flights=flights_over(
-                [load_scene(name) for name in self.scenes or extent.scenes],
-                self._count("--flights", self.flights, extent.flights),
-                sensor_preset(self.sensors or extent.sensors),
-                self.checked_seed(),
-                extent.heaps,
-            ),
-            setups=[setup] if self.alone else with_companions(setup, few=self.quick),
+            flights=self._flights(extent, level),
+            setups=setups if level is None else level.under(setups),
             protocol=self._protocol(extent),
             budget=self.budget,
             negatives=extent.negatives,
             sequences=int(in_range("--sequences", self.sequences or 0)),
         )
 
-    def _extent(self, preset: str) -> Extent:
+    def _level(self) -> Level | None:
+        """The level asked for; refuses what it fixes."""
+        from evaluation.measure.levels.level import load_level
+
+        if self.level is None:
+            return None
+        fixed = {"scenes": self.scenes, "sensors": self.sensors, "heading": self.north}
+        for word, given in fixed.items():
+            if given:
+                raise InputError(f"--{word}: level {self.level} fixes it; give it without --level")
+        return load_level(self.level)
+
+    def _setup_at(self, level: Level) -> Setup:
+        """The setup with the level's heading."""
+        setup = replace(self, north=level.heading).setup()
+        if setup.config.localization.heading != level.heading:
+            raise InputError(
+                f"--set localization.heading: level {level.name} fixes it; give it without --level"
+            )
+        return setup
+
+    def _flights(self, extent: Extent, level: Level | None) -> list[Flight]:
+        from evaluation.measure.plans.reproduce import flights_over
+        from sim.scene import load_scene
+        from sim.sensors.presets import sensor_preset
+
+        count, seed = self._count("--flights", self.flights, extent.flights), self.checked_seed()
+        if level is not None:
+            return level.flown(count, seed)
+        scenes = [load_scene(name) for name in self.scenes or extent.scenes]
+        sensors = sensor_preset(self.sensors or extent.sensors)
+        return flights_over(scenes, count, sensors, seed, extent.heaps)
+
+    def _extent(self, preset: str, level: Level | None) -> Extent:
+        if level is not None:
+            return Extent(**{field.name: getattr(level, field.name) for field in fields(Extent)})
         sensors = FULL.sensors if preset == "best" else TWIN.sensors
         if self.quick:
             return replace(QUICK, sensors=sensors)

@@ -99,6 +99,7 @@ class Check(Verb):
         from evaluation.judge.verdict import Verdict, compare
         from evaluation.show.comparison import verdict_json, verdict_table
 
+        self._check_level()
         before = self._reference()
         after = Measured.of(read_table(self.results), before.condition)
         comparison = compare(before, after)
@@ -116,6 +117,15 @@ class Check(Verb):
             if file is not None:
                 file.write_text(written(comparison), encoding="utf-8")
         return EXIT_WORSE if comparison.of(Verdict.WORSE) else EXIT_OK
+
+    def _check_level(self) -> None:
+        """Results of another level are no reference."""
+        from evaluation.judge.results import read_level
+        from evaluation.setup.level_mark import check_same_level
+
+        if self.against.is_dir():
+            here = str(self.results)
+            check_same_level(read_level(self.against), read_level(self.results), here)
 
     def _reference(self) -> Measured:
         from evaluation.judge.accepted import Accepted, Measured

@@ -10,6 +10,7 @@ from airground.config import Config
 from airground.errors import InputError
 from evaluation.judge.summary import Summary
 from evaluation.measure.showcase import Showcase
+from evaluation.setup.level_mark import LevelMark
 from evaluation.setup.settings import resolve
 from evaluation.table.rows import ResultTable
 
@@ -26,6 +27,7 @@ class Results:
         seed: Seed of everything random.
         showcase: Data of the pictures; None without pictures.
         notes: Sentences for the end of the report.
+        level: The level of difficulty; None where none was asked for.
     """
 
     table: ResultTable
@@ -33,18 +35,20 @@ class Results:
     seed: int
     showcase: Showcase | None = None
     notes: Sequence[str] = ()
+    level: LevelMark | None = None
 
 
 def read_results(folder: Path) -> Results:
     """Read the files of a run; raises InputError where one is missing or damaged."""
     _check_folder(folder)
-    seed = Summary.read(folder / SUMMARY).seed
+    summary = Summary.read(folder / SUMMARY)
     showcase = folder / SHOWCASE
     return Results(
         table=ResultTable.read(folder / TABLE),
         config=resolve(file=folder / CONFIG),
-        seed=seed,
+        seed=summary.seed,
         showcase=Showcase.load(showcase) if showcase.is_dir() else None,
+        level=summary.level,
     )
 
 
@@ -52,6 +56,12 @@ def read_table(folder: Path) -> ResultTable:
     """Read only the measurements of a run; errors as of `read_results`."""
     _check_folder(folder)
     return ResultTable.read(folder / TABLE)
+
+
+def read_level(folder: Path) -> LevelMark | None:
+    """The level that a run states; errors as of `read_results`."""
+    _check_folder(folder)
+    return Summary.read(folder / SUMMARY).level
 
 
 def _check_folder(folder: Path) -> None:
@@ -75,4 +85,5 @@ def merged(parts: Sequence[Results]) -> Results:
         seed=first.seed,
         showcase=showcases[0] if showcases else None,
         notes=[f"Put together from {len(parts)} runs."] if len(parts) > 1 else [],
+        level=first.level if all(part.level == first.level for part in parts) else None,
     )

@@ -14,6 +14,7 @@ from evaluation.judge.results import SUMMARY, read_results
 from evaluation.judge.samples import Flight
 from evaluation.judge.summary import Summary
 from evaluation.judge.verdict import MOVED, Comparison, Verdict, compare
+from evaluation.setup.level_mark import check_same_level
 from evaluation.table.rows import SEQUENCE_KEYS, ResultTable
 
 MOST_RUNS = 4
@@ -126,8 +127,10 @@ def against(reference: Run, run: Run) -> Against:
     Without a shared flight, all flights of both are compared as two samples.
 
     Raises:
-        InputError: No flight is shared, and the scenes or numbers of flights differ too.
+        InputError: They are of different levels, or no flight is shared and the scenes or numbers
+            of flights differ too.
     """
+    check_same_level(reference.summary.level, run.summary.level, run.name)
     before, after = reference.measured, run.measured
     shared = set(before.flights) & set(after.flights)
     left_out = 0

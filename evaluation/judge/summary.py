@@ -2,7 +2,7 @@
 
 A summary is of one condition. All keys are always there. A quantile that failures reach (they
 count as infinite) is null, and so is what was not measured: all of `slam` with poses from an
-oracle, `realtime` without a live run, `reproduction` with the preset `best`.
+oracle, `realtime` without a live run, `reproduction` with the preset `best`, `level` without one.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from evaluation.judge.reproduction import Reproduced, reproduction_summary
 from evaluation.judge.samples import localization, located, refined
 from evaluation.setup.checked_json import Count, Number, Part, Share, number, read_checked
 from evaluation.setup.condition import Condition, RunInfo
+from evaluation.setup.level_mark import LevelMark
 from evaluation.table.intervals import Quantiles, quantiles
 from evaluation.table.limits import LOCATED_M, NEAR_M
 from evaluation.table.rows import ResultTable
@@ -126,6 +127,7 @@ class Summary(Part):
     preset: PresetName
     poses: Literal["oracle", "slam"]
     seed: int
+    level: LevelMark | None = None
     scenes: list[str]
     machine: Machine
     slam: Slam
@@ -150,7 +152,9 @@ class Summary(Part):
         return read_checked(cls, path, "summary")
 
 
-def build_summary(table: ResultTable, condition: Condition, run: RunInfo) -> Summary:
+def build_summary(
+    table: ResultTable, condition: Condition, run: RunInfo, level: LevelMark | None = None
+) -> Summary:
     """Sum up what was measured under one condition (control scenes apart, but for claims).
 
     Raises:
@@ -169,6 +173,7 @@ def build_summary(table: ResultTable, condition: Condition, run: RunInfo) -> Sum
         preset=condition.preset,  # type: ignore[arg-type]
         poses="slam" if condition.poses == "slam" else "oracle",
         seed=run.seed,
+        level=level,
         scenes=measured.scenes(),
         machine=Machine(cpu=run.cpu, cores=run.cores),
         slam=_slam(measured, condition),

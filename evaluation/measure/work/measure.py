@@ -125,6 +125,7 @@ def record_flight(task: ToRecord) -> Refused | None:
             flight.duration_s,
             workers=task.workers,
             flight=flight.flight,
+            dials=flight.dials,
         )
     except InputError as error:
         return Refused(str(error))
@@ -132,7 +133,9 @@ def record_flight(task: ToRecord) -> Refused | None:
 
 
 def recording_name(flight: Flight) -> str:
-    """Name of a flight's recording."""
+    """Name of a flight's recording; one whose dials are turned has another name than one whose
+    dials are not."""
     length = "" if flight.duration_s is None else f"_{flight.duration_s:g}s"
     number = f"seed{flight.seed}_flight{flight.flight}"
-    return f"{flight.scene.name}_{flight.sensors.name}_{number}{length}"
+    dials = "".join(f"_{name}={value:g}" for name, value in sorted((flight.dials or {}).items()))
+    return f"{flight.scene.name}_{flight.sensors.name}_{number}{length}{dials}"

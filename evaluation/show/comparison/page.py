@@ -119,6 +119,7 @@ def _conditions(run: Run) -> dict[str, str]:
     summary, measured = run.summary, run.measured
     return {
         "condition": measured.condition.label(),
+        "level": MISSING if summary.level is None else str(summary.level),
         "code": f"{summary.version}, revision {summary.git_revision}",
         "flights": measured.suite,
         "seeds of the flights": _seeds(measured.flights),

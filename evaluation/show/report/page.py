@@ -16,6 +16,7 @@ from evaluation.judge.summary import Summary, build_summary
 from evaluation.measure.showcase import Showcase
 from evaluation.setup import published
 from evaluation.setup.condition import RunInfo, shared_parts
+from evaluation.setup.level_mark import LevelMark
 from evaluation.setup.settings import write_config
 from evaluation.show.figures.style import ReportFigure, save_figure
 from evaluation.show.report.baselines import baseline_table
@@ -36,12 +37,12 @@ from evaluation.table.rows import ResultTable
 def write_results(results: Results, folder: Path) -> Summary:
     """Write table, summary, configuration, report and figures into an existing folder."""
     run = RunInfo.here(results.seed)
-    summary = build_summary(results.table, results.table.conditions()[0], run)
+    summary = build_summary(results.table, results.table.conditions()[0], run, results.level)
     results.table.write(folder / TABLE)
     write_config(results.config, folder / CONFIG)
     if results.showcase is not None:
         results.showcase.save(folder / SHOWCASE)
-    write_report(folder, results.table, results.showcase, run, notes=results.notes)
+    write_report(folder, results.table, results.showcase, run, results.notes, results.level)
     summary.write(folder / SUMMARY)
     return summary
 
@@ -52,6 +53,7 @@ def write_report(
     showcase: Showcase | None,
     run: RunInfo,
     notes: Sequence[str] = (),
+    level: LevelMark | None = None,
 ) -> None:
     """Write `report.html`, `figures/` (PNG, PDF, CSV) and `tables/` (LaTeX) into `out`.
 
@@ -64,6 +66,7 @@ def write_report(
         showcase: What the pictures are drawn from; None leaves them out.
         run: Where the results come from.
         notes: Sentences that the page lists at its end.
+        level: The level of difficulty that the page names; None without.
     """
     shown = table.conditions()
     primary = table.of(shown[0])
@@ -86,6 +89,7 @@ def write_report(
         condition=shown[0].label(),
         scenes=measured.scenes(),
         run=run,
+        level=level,
         headlines=headlines(measured),
         shared=shared_parts(shown) if len(shown) > 1 else shown[0].label(),
         pictures=[saved_picture(f, out, table) for f in report_figures(table, shown, showcase)],

@@ -28,9 +28,10 @@ from evaluation.table.rows import ResultTable
 def print_summary(summary: Summary, console: Console | None = None) -> None:
     """Print the headline numbers of a summary beside the paper's."""
     poses = {"oracle": "oracle poses", "slam": "poses from SLAM"}[summary.poses]
+    level = "" if summary.level is None else f", level {summary.level}"
     print_table(
         TextTable(("", "here", "paper"), tuple(_rows(summary))),
-        f"{', '.join(summary.scenes)}: preset {summary.preset}, {poses}",
+        f"{', '.join(summary.scenes)}{level}: preset {summary.preset}, {poses}",
         "same protocol, simulated; the paper: real robots",
         console=console,
         bold=(1,),

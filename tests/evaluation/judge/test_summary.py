@@ -26,8 +26,8 @@ def test_every_key_of_the_contract_is_there(table: ResultTable, tmp_path: Path) 
     build_summary(table, BEST, RUN).write(tmp_path / "summary.json")
     made = json.loads((tmp_path / "summary.json").read_text())
     assert list(made) == [
-        "schema", "version", "git_revision", "preset", "poses", "seed", "scenes", "machine",
-        "slam", "surface", "localization", "refinement", "timing_ms",
+        "schema", "version", "git_revision", "preset", "poses", "seed", "level", "scenes",
+        "machine", "slam", "surface", "localization", "refinement", "timing_ms",
         "real_time_factor", "realtime", "claims", "calibration", "reproduction",
     ]  # fmt: skip
     assert made["machine"] == {"cpu": "some processor", "cores": 2}

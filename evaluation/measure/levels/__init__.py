@@ -1,0 +1,1 @@
+"""Levels of difficulty: frozen and versioned settings, one TOML file each."""
