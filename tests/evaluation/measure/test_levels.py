@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import get_args
 
@@ -26,14 +26,14 @@ from tests.evaluation.show.made_runs import INFO, made_run
 
 NAMES = get_args(LevelName)
 DIGESTS = {
-    "paper 1": "6c32e96ae840fcae",
-    "easy 1": "2b73bcc8f6b97af5",
-    "medium 1": "050015b5a359fa0b",
-    "hard 1": "ccd324b552fd1411",
-    "extreme 1": "6dcb9579331094ea",
+    "paper 1": "d965402b75c29696",
+    "easy 1": "accc3444c4683e55",
+    "medium 1": "ea40a3eece59f887",
+    "hard 1": "14bf0139c6eeaeb9",
+    "extreme 1": "80e3a3a46422788d",
 }
-"""Of all that a level flies. A level that should differ gets a new version; only where a new key
-of scenes or sensors has a default that changes no recording, a digest may change here."""
+"""Of all that a level flies. A level that should differ gets a new version: these lines only grow.
+"""
 
 
 OTHER_SCENE = tomli_w.dumps(
@@ -47,11 +47,21 @@ def plan(*words: str) -> Plan:
     return made.plan()
 
 
+def stated(value: object) -> object:
+    """A dataclass as JSON without its defaults, so that a new field that is off changes nothing."""
+    if isinstance(value, tuple):
+        return [stated(one) for one in value]
+    if not is_dataclass(value):
+        return value
+    given = {field.name: (getattr(value, field.name), field.default) for field in fields(value)}
+    return {name: stated(one) for name, (one, default) in given.items() if one != default}
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_no_level_changes_under_its_name_and_version(name: str) -> None:
     level = load_level(name)
     flown = [
-        (flight.scene.model_dump(mode="json", exclude_defaults=True), asdict(flight.sensors))
+        (flight.scene.model_dump(mode="json", exclude_defaults=True), stated(flight.sensors))
         for flight in level.flown(1, seed=0)
     ]
     text = json.dumps([level.heading, level.heaps, flown], sort_keys=True)
