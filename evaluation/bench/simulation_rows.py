@@ -21,7 +21,7 @@ from airground.io.png_encoder import encode_png
 from evaluation.bench.material import Material
 from evaluation.bench.work import Work
 from sim.recording.frames import FrameMaker, FramePlan
-from sim.recording.recorder import Flight, store_models, write_all_but_images
+from sim.recording.recorder import Flight, with_models, write_all_but_images
 from sim.recording.render import draw_with
 from sim.robots.motion import Robot
 from sim.scene import load_scene
@@ -66,7 +66,7 @@ def simulated() -> Simulated:
     with tempfile.TemporaryDirectory(prefix="airground-bench-") as folder:
         flight = Flight(load_scene(SCENE), SEED, 0, NOMINAL, DURATION_S)
         _, plan, plain = write_all_but_images(Path(folder), flight)
-        store_models(plan, plain)
+        plan = with_models(plan, plain)
         return Simulated(plan, FrameMaker(plan))
 
 

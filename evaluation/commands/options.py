@@ -125,8 +125,8 @@ class SensorOption:
     heading: ClassVar[str] = "input"
 
     sensors: Literal["none", "nominal", "harsh", "paper", "real"] = "nominal"
-    """noise and calibration errors; paper: sensors of 2013; real: nominal ones with distortion and
-    rolling shutters"""
+    """noise and calibration errors; paper: sensors of 2013; real: nominal ones with distortion,
+    rolling shutters, automatic exposure"""
 
 
 @dataclass(frozen=True, kw_only=True)

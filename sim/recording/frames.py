@@ -24,6 +24,7 @@ from sim.recording.render import Renderer
 from sim.recording.robot_view import RobotView
 from sim.robots.motion import ROBOTS, Motion, Robot
 from sim.robots.moving_bodies import read_bodies
+from sim.sensors.auto_exposure import Exposure, ExposureCourse
 from sim.sensors.camera import ImageSensor
 from sim.sensors.faulty_frames import FaultyFrames
 from sim.sensors.pixel_rays import PixelRays
@@ -53,6 +54,7 @@ class FramePlan:
         driver: Nominal calibration by which depth is registered; None if it is not.
         taken_ns: Nominal stamps at which each robot's camera takes an image [ns].
         frames: The frames that are left of them by faults of the sensors.
+        exposures: Courses of the cameras' automatic exposure; none if exposure is fixed.
     """
 
     recording: Path
@@ -67,11 +69,24 @@ class FramePlan:
     unlit: WorldFiles | None = None
     lamp: CarriedLamp | None = None
     shadows: Mapping[Robot, DroneShadow] = field(default_factory=dict)
+    exposures: Mapping[Robot, ExposureCourse] = field(default_factory=dict)
 
     def world_files(self) -> set[WorldFiles]:
         """Files of all worlds."""
         unlit = set() if self.unlit is None else {self.unlit}
         return set(self.worlds.values()) | unlit
+
+    def exposures_of_images(self) -> dict[Robot, list[tuple[int, Exposure]]]:
+        """Stamps of all images [ns] and how automatic exposure took each."""
+        return {robot: self._exposures(robot, course) for robot, course in self.exposures.items()}
+
+    def _exposures(self, robot: Robot, course: ExposureCourse) -> list[tuple[int, Exposure]]:
+        frames, table = self.frames[robot], self.true.mav if robot == "mav" else self.true.ground
+        times_ns = self.taken_ns[robot][frames.taken] + table.camera.time_offset_ns
+        return [
+            (int(stamp), course.at(int(time_ns)))
+            for stamp, time_ns in zip(frames.stamps_ns, times_ns, strict=True)
+        ]
 
 
 @dataclass(frozen=True)
@@ -190,10 +205,12 @@ class FrameMaker:
     ) -> NDArray[np.uint8]:
         """The picture that a robot's sensor takes of what its view has drawn at a time [ns]."""
         sensor = self._sensors[robot]
-        half_ns = round(sensor.noise.exposure_s * 0.5e9)
+        course = self._plan.exposures.get(robot)
+        exposure = sensor.fixed if course is None else course.at(time_ns)
+        half_ns = round(exposure.exposure_s * 0.5e9)
         start = self._motion.camera_pose(robot, time_ns - half_ns)
         T_start_end = start.inverse() @ self._motion.camera_pose(robot, time_ns + half_ns)
-        return sensor.expose(sharp, depth, T_start_end, time_ns * 1e-9, rng)
+        return sensor.expose(sharp, depth, T_start_end, time_ns * 1e-9, rng, exposure)
 
     def _write(self, folder: str, name: str, image: NDArray) -> Written:
         data = encode_png(image)

@@ -32,6 +32,7 @@ from sim.recording.depth_camera import depth_tiles
 from sim.recording.drone_shadow import DroneShadow
 from sim.recording.frame_pool import FrameServer, FrameWorkers, frame_workers, make_frames
 from sim.recording.frames import FramePlan, WorldFiles
+from sim.recording.light_meter import meter_camera, meter_name, with_exposure
 from sim.recording.render import with_cameras
 from sim.recording.truth import write_truth
 from sim.recording.view_tiles import tiles_of
@@ -112,7 +113,7 @@ def record(
     try:
         with partial_folder(out) as temporary, frame_workers(workers) as pool:
             header, plan, plain = write_all_but_images(temporary, what)
-            store_models(plan, plain)
+            plan = with_models(plan, plain)
             digests = _render(plan, pool, progress)
             for files in plan.world_files():
                 files.model.unlink()
@@ -144,7 +145,7 @@ def rendered(flight: Flight, workers: int) -> Iterator[Recording]:
         try:
             header, plan, plain = write_all_but_images(root, flight)
             recording_writer.finish(root, header, {})
-            store_models(plan, plain)
+            plan = with_models(plan, plain)
         except OSError as error:
             raise AirgroundError(f"{root}: the flight cannot be prepared there: {error}") from None
         ground = header.calibration.ground
@@ -174,7 +175,7 @@ class _DrawnImages:
 def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan, World]:
     """Simulate a flight and write its samples, lists and truth into an empty folder.
 
-    Returns the header, to be written last; the plan of the images, which needs `store_models`;
+    Returns the header, to be written last; the plan of the images, which needs `with_models`;
     and the ground robot's world, without pictures.
     """
     scene, preset, seeds = flight.scene, flight.sensors, (flight.seed, flight.flight)
@@ -242,14 +243,16 @@ def _unlit_files(root: Path) -> WorldFiles:
     return WorldFiles(root / "world_unlit.mjb", root / "edges_unlit.npz")
 
 
-def store_models(plan: FramePlan, plain: World) -> None:
-    """Paint the worlds once for all processes: pictures take long to make."""
+def with_models(plan: FramePlan, plain: World) -> FramePlan:
+    """Paint the worlds once for all processes, for pictures take long to make, and meter their
+    light; the plan is then complete."""
     drive = painted(plain)
     _store_model(plan, plan.worlds["ground"], drive)
     if plan.worlds["mav"] != plan.worlds["ground"]:
         _store_model(plan, plan.worlds["mav"], flight_world(drive))
     if plan.unlit is not None:
         _store_model(plan, plan.unlit, unlit_world(drive))
+    return with_exposure(plan)
 
 
 def _store_model(plan: FramePlan, files: WorldFiles, world: World) -> None:
@@ -261,6 +264,8 @@ def _store_model(plan: FramePlan, files: WorldFiles, world: World) -> None:
     tiles = [tile for robot, lens in lenses.items() for tile in tiles_of(robot, lens)]
     tiles += depth_tiles(plan.true.ground)
     cameras = {tile.name: tile.camera for tile in tiles}
+    if plan.preset.exposure is not None:
+        cameras |= {meter_name(robot): meter_camera(lens) for robot, lens in lenses.items()}
     spec = world.spec.copy()
     add_bodies(spec, read_bodies(plan.motion.parent), None if files == plan.unlit else light)
     model = with_cameras(spec, cameras)
@@ -286,6 +291,8 @@ def _within(
     """The stamps whose rows, exposures and depth images end before the motion does."""
     readout_s = max(preset.mav_optics.readout_s, preset.ground_optics.readout_s)
     exposure_s = preset.image.exposure_s if preset.image else 0.0
+    if preset.exposure is not None:
+        exposure_s = max(exposure_s, preset.exposure.exposure_s[1])
     clock_ns = preset.calibration.time_offset_ns if preset.calibration else 0
     reach_ns = round((readout_s + exposure_s) * 0.5e9) + clock_ns + preset.depth_delay_ns
     return stamps_ns[stamps_ns + reach_ns <= motion.stamps_ns[-1]]

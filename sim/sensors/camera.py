@@ -1,4 +1,7 @@
-"""A camera's faults: motion blur, vignetting, wandering exposure, noise, 8 bits."""
+"""A camera's faults: motion blur, vignetting, wandering exposure, gain, noise, gamma, 8 bits.
+
+Light is in grey levels of the sharp picture. Noise is added to light; gamma comes after it.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +13,18 @@ from numba import njit
 from numpy.typing import NDArray
 
 from airground.core.se3 import SE3
+from sim.sensors.auto_exposure import WHITE, Exposure
 from sim.sensors.hashed_noise import gaussian, noise_key
+from sim.sensors.pixel_motion import pixel_motion
 from sim.sensors.pixel_rays import PixelRays
 from sim.sensors.presets import ImageNoise
 
 MAX_SAMPLES = 32
 _PERIODS_S = (2.5, 20.0)
 _WAVES = 6
+_RESPONSE_STEPS = 65535
+"""Steps of light from black to white in the table of a response: finer than a grey level wherever
+light is above a millionth of white, for gammas up to 2.4."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,12 +61,15 @@ class ImageSensor:
         noise: Size of the faults.
         drift: Exposure over time.
         vignette: (height, width) float32 factor on the light, 1 in the middle.
+        response: Grey levels of light from black to white, in even steps; empty where a grey level
+            is the light, rounded.
     """
 
     rays: PixelRays
     noise: ImageNoise
     drift: ExposureDrift
     vignette: NDArray[np.float32]
+    response: NDArray[np.uint8]
 
     @classmethod
     def of(cls, rays: PixelRays, noise: ImageNoise, rng: np.random.Generator) -> ImageSensor:
@@ -68,7 +79,12 @@ class ImageSensor:
         squared = x[None, :] ** 2 + y[:, None] ** 2
         vignette = 1 - noise.vignetting * squared / squared.max()
         drift = ExposureDrift.draw(noise.exposure_drift, rng)
-        return cls(rays, noise, drift, vignette.astype(np.float32))
+        return cls(rays, noise, drift, vignette.astype(np.float32), _response(noise.gamma))
+
+    @property
+    def fixed(self) -> Exposure:
+        """The exposure that shows light as it is."""
+        return Exposure(self.noise.exposure_s)
 
     def expose(
         self,
@@ -77,6 +93,7 @@ class ImageSensor:
         T_start_end: SE3,
         time_s: float,
         rng: np.random.Generator,
+        exposure: Exposure | None = None,
     ) -> NDArray[np.uint8]:
         """The picture that this camera would have taken.
 
@@ -85,41 +102,42 @@ class ImageSensor:
             depth: (height, width) [m], NaN where there is nothing.
             T_start_end: Motion of the camera during the exposure of the middle row: its pose at
                 the end in its frame at the start.
-            time_s: Time of the exposure, for the gain [s].
+            time_s: Time of the exposure, for its drift [s].
             rng: For the noise.
+            exposure: Exposure time and gain, which the motion must agree with; the fixed ones if
+                None. Gain is on light and noise.
 
         Returns:
             (height, width, channels) uint8.
         """
         planes = cv2.split(sharp)
+        exposure = self.fixed if exposure is None else exposure
+        gain = exposure.gain
+        light = gain * _ratio(exposure.exposure_s, self.noise.exposure_s)
         keys = np.array([noise_key(rng) for _ in planes], np.uint64)
         exposed = _expose(
             np.stack(planes),
             pixel_motion(depth, self.rays, T_start_end),
             self.vignette,
-            np.float32(self.drift.gain(time_s)),
-            np.float32(self.noise.read_noise**2),
-            np.float32(self.noise.shot_noise),
+            np.float32(self.drift.gain(time_s) * light),
+            np.float32(self.noise.read_noise**2 * gain**2),
+            np.float32(self.noise.shot_noise * gain),
             keys,
+            self.response,
         )
         return np.asarray(cv2.merge(list(exposed)), np.uint8).reshape(sharp.shape)
 
 
-def pixel_motion(
-    depth: NDArray[np.float32], rays: PixelRays, T_start_end: SE3
-) -> NDArray[np.float32]:
-    """(2, height, width) motion of each pixel's scene point along columns and rows [px]."""
-    motion = np.empty((2, *depth.shape), np.float32)
-    twist = T_start_end.log().astype(np.float32)
-    if rays.bent is not None:
-        _lens_motion(depth, rays.bent, twist, motion)
-        return motion
-    camera = rays.camera
-    fx, fy, cx, cy = np.array([camera.fx, camera.fy, camera.cx, camera.cy], np.float32)
-    x_rays = (np.arange(camera.width) - np.float64(cx)) / np.float64(fx)
-    y_rays = (np.arange(camera.height) - np.float64(cy)) / np.float64(fy)
-    _pinhole_motion(depth, x_rays, y_rays, np.array([fx, fy]), twist, motion)
-    return motion
+def _ratio(exposure_s: float, fixed_s: float) -> float:
+    return 1.0 if exposure_s == fixed_s else exposure_s / fixed_s
+
+
+def _response(gamma: float) -> NDArray[np.uint8]:
+    """Grey levels of even steps of light; none for a gamma of 1."""
+    if gamma == 1:
+        return np.empty(0, np.uint8)
+    light = np.arange(_RESPONSE_STEPS + 1) / _RESPONSE_STEPS
+    return np.rint(WHITE * light ** (1 / gamma)).astype(np.uint8)
 
 
 # Each loop below does one kind of work along a row, and has no branch: so the compiler
@@ -127,49 +145,7 @@ def pixel_motion(
 
 
 @njit(cache=True, error_model="numpy")
-def _row_motion(depth, x_rays, y, focal_px, twist, mx, my):  # type: ignore[no-untyped-def]
-    """Pixel motion of one row, into `mx` and `my`."""
-    fx, fy = focal_px
-    vx, vy, vz, wx, wy, wz = twist
-    for column in range(len(depth)):
-        x = x_rays[column]
-        inverse = np.float32(1) / depth[column]
-        inverse = inverse if inverse > 0 else np.float32(0)
-        dx = -vx * inverse - (wy - wz * y)
-        dy = -vy * inverse - (wz * x - wx)
-        dz = -vz * inverse - (wx * y - wy * x)
-        mx[column] = fx * (dx - x * dz)
-        my[column] = fy * (dy - y * dz)
-
-
-@njit(cache=True, error_model="numpy")
-def _pinhole_motion(depth, x_rays, y_rays, focal_px, twist, motion):  # type: ignore[no-untyped-def]
-    for row in range(len(depth)):
-        _row_motion(
-            depth[row], x_rays, y_rays[row], focal_px, twist, motion[0, row], motion[1, row]
-        )
-
-
-@njit(cache=True, error_model="numpy")
-def _lens_motion(depth, bent, twist, motion):  # type: ignore[no-untyped-def]
-    """As `_row_motion`, with a ray and a derivative for each pixel."""
-    vx, vy, vz, wx, wy, wz = twist
-    height, width = depth.shape
-    for row in range(height):
-        for column in range(width):
-            x, y = bent[0, row, column], bent[1, row, column]
-            inverse = np.float32(1) / depth[row, column]
-            inverse = inverse if inverse > 0 else np.float32(0)
-            dx = -vx * inverse - (wy - wz * y)
-            dy = -vy * inverse - (wz * x - wx)
-            dz = -vz * inverse - (wx * y - wy * x)
-            dx, dy = dx - x * dz, dy - y * dz
-            motion[0, row, column] = bent[2, row, column] * dx + bent[3, row, column] * dy
-            motion[1, row, column] = bent[4, row, column] * dx + bent[5, row, column] * dy
-
-
-@njit(cache=True, error_model="numpy")
-def _expose(planes, motion, vignette, gain, read, shot, keys):  # type: ignore[no-untyped-def]
+def _expose(planes, motion, vignette, gain, read, shot, keys, response):  # type: ignore[no-untyped-def]
     """(channels, height, width): each pixel's mean along its motion, with all faults."""
     channels, height, width = planes.shape
     quads = np.empty((channels, height * width), np.uint32)
@@ -193,7 +169,7 @@ def _expose(planes, motion, vignette, gain, read, shot, keys):  # type: ignore[n
         for channel in range(channels):
             _develop(
                 light[channel], step, gain, vignette[row], read, shot,
-                keys[channel], row * width, image[channel, row],
+                keys[channel], row * width, response, image[channel, row],
             )  # fmt: skip
     return image
 
@@ -267,10 +243,24 @@ def _add_sample(sample, samples, corners, ax, ay, light):  # type: ignore[no-unt
 
 
 @njit(cache=True)
-def _develop(light, step, gain, vignette, read, shot, key, first, image):  # type: ignore[no-untyped-def]
+def _develop(light, step, gain, vignette, read, shot, key, first, response, image):  # type: ignore[no-untyped-def]
     """Light losses, noise and rounding; `first` is the number of the row's first pixel."""
     zero, half, white = np.float32(0), np.float32(0.5), np.float32(255)
+    if len(response) > 0:
+        _develop_curved(light, step, gain, vignette, read, shot, key, first, response, image)
+        return
     for column in range(len(light)):
         mean = light[column] * (step[column] * gain * vignette[column])
         noisy = mean + np.sqrt(read + shot * mean) * gaussian(key, first + column)
         image[column] = np.uint8(min(max(noisy + half, zero), white))
+
+
+@njit(cache=True)
+def _develop_curved(light, step, gain, vignette, read, shot, key, first, response, image):  # type: ignore[no-untyped-def]
+    """As `_develop`, with a response of the camera in place of the rounding."""
+    zero, half, steps = np.float32(0), np.float32(0.5), np.float32(len(response) - 1)
+    scale = steps / np.float32(255)
+    for column in range(len(light)):
+        mean = light[column] * (step[column] * gain * vignette[column])
+        noisy = mean + np.sqrt(read + shot * mean) * gaussian(key, first + column)
+        image[column] = response[np.int32(min(max(noisy * scale + half, zero), steps))]

@@ -9,6 +9,7 @@ import numpy as np
 
 from airground.errors import InputError
 from airground.io.lens import KINECT_READOUT_S
+from sim.sensors.auto_exposure import CONSUMER_EXPOSURE, RESPONSE_709, AutoExposure
 from sim.sensors.faults import Fault
 from sim.sensors.optics import PINHOLE, Optics
 from sim.world.magnetic_field import EARTH_FIELD_WORLD
@@ -23,7 +24,9 @@ class ImageNoise:
         shot_noise: Variance added per grey level of light [grey levels].
         vignetting: Share of the light that is lost in the corners.
         exposure_drift: Deviation of the logarithm of the gain, over seconds.
-        exposure_s: Exposure time [s].
+        exposure_s: Exposure time [s]; with automatic exposure the one that shows light as it is.
+        gamma: A grey level is white times light to the power of 1 / gamma, beside the 2.2 that
+            pictures have already.
     """
 
     read_noise: float
@@ -31,6 +34,7 @@ class ImageNoise:
     vignetting: float
     exposure_drift: float
     exposure_s: float
+    gamma: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -127,6 +131,10 @@ class SensorPreset:
             nominal calibration; if not, depth is stored as it is measured. Without a baseline it
             makes no difference.
         faults: Failures of single sensors, for a while.
+        exposure: Automatic exposure of both cameras; None for a fixed one.
+
+    Raises:
+        InputError: Automatic exposure of cameras that are perfect, or take no time.
     """
 
     name: str
@@ -141,6 +149,13 @@ class SensorPreset:
     depth_baseline_m: float = 0.0
     depth_registered: bool = True
     faults: tuple[Fault, ...] = ()
+    exposure: AutoExposure | None = None
+
+    def __post_init__(self) -> None:
+        if self.exposure is not None and (self.image is None or self.image.exposure_s <= 0):
+            raise InputError(
+                f"sensors '{self.name}' cannot have automatic exposure: images are perfect"
+            )
 
 
 # ADIS16448 as in EuRoC's sensor.yaml; the biases are those of a few minutes after turn-on.
@@ -168,10 +183,12 @@ MPU6000 = ImuNoise(
 
 NONE = SensorPreset("none", None, None, None, None, None)
 
+# 2 grey levels of noise at mid grey.
+_NOMINAL_IMAGE = ImageNoise(1.0, 0.0235, 0.20, 0.03, 0.005)
+
 NOMINAL = SensorPreset(
     "nominal",
-    # 2 grey levels of noise at mid grey.
-    image=ImageNoise(1.0, 0.0235, 0.20, 0.03, 0.005),
+    image=_NOMINAL_IMAGE,
     depth=DepthNoise(1.0, 0.8, 1 / 8, 82.0, 2.0, (0.5, 5.0)),
     imu=ADIS16448,
     magnetic=MagneticNoise(0.2e-6, 0.3e-6, 0.6),
@@ -205,6 +222,8 @@ PAPER = SensorPreset(
 REAL = replace(
     NOMINAL,
     name="real",
+    image=replace(_NOMINAL_IMAGE, gamma=RESPONSE_709),
+    exposure=CONSUMER_EXPOSURE,
     # 480 rows, one each 30 us.
     mav_optics=Optics("radtan", readout_s=0.0144),
     ground_optics=Optics("radtan", readout_s=KINECT_READOUT_S),
@@ -212,8 +231,8 @@ REAL = replace(
     depth_delay_ns=10_000_000,
     depth_baseline_m=0.025,
 )
-"""The noise of `nominal`, with lenses, rolling shutters and a Kinect of two cameras, as consumer
-cameras have them."""
+"""The noise of `nominal`, with the lenses, rolling shutters and exposure of consumer cameras, and a
+Kinect of two cameras."""
 
 PRESETS = {preset.name: preset for preset in (NONE, NOMINAL, HARSH, PAPER, REAL)}
 
@@ -269,6 +288,22 @@ def with_distortion(preset: SensorPreset, factor: float) -> SensorPreset:
         mav_optics=replace(preset.mav_optics, lens="radtan", distortion=factor),
         ground_optics=replace(preset.ground_optics, lens="radtan", distortion=factor),
     )
+
+
+def with_auto_exposure(preset: SensorPreset, strength: float) -> SensorPreset:
+    """The preset with automatic exposure that makes this share of the corrections, in stops, that
+    `real` makes; 0 is a fixed exposure."""
+    exposure = replace(CONSUMER_EXPOSURE, strength=strength) if strength > 0 else None
+    return replace(preset, exposure=exposure)
+
+
+def with_gamma(preset: SensorPreset, gamma: float) -> SensorPreset:
+    """The preset with this gamma of both cameras; InputError if their images are perfect."""
+    if preset.image is None:
+        if gamma == 1:
+            return preset
+        raise InputError(f"sensors '{preset.name}' cannot have a gamma: images are perfect")
+    return replace(preset, image=replace(preset.image, gamma=gamma))
 
 
 def with_dropped(preset: SensorPreset, seconds: float) -> SensorPreset:

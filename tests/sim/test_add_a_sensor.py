@@ -21,7 +21,7 @@ from tests.sim.small_flight import SCENE, few_stamps, unpainted
 
 PAGE = Path(__file__).parents[2] / "docs" / "add_a_sensor.md"
 EXAMPLES = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.S)
-PRESET, FAILING, RANGEFINDER = EXAMPLES
+PRESET, SLOW, FAILING, RANGEFINDER = EXAMPLES
 
 
 @pytest.fixture(autouse=True)
@@ -43,7 +43,8 @@ def test_a_recording_is_made_with_the_preset(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    names_after(PRESET + FAILING, tmp_path)
+    slow = names_after(PRESET + SLOW + FAILING, tmp_path)["SLOW"]
+    assert (slow.exposure.damping, slow.exposure.frequency_hz) == (1.0, 0.3)
     recording, truth = Recording.open("recordings/home"), Truth.open("recordings/home")
     recording.verify()
     faults = Path("recordings/failing/truth/faults.csv").read_text().splitlines()

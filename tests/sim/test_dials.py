@@ -84,7 +84,7 @@ def test_fading_keeps_the_mean_colour_and_scales_the_contrast() -> None:
 def test_noise_is_scaled_and_nothing_else(preset: SensorPreset) -> None:
     assert with_noise(preset, 1.0) == preset
     double = asdict(with_noise(preset, 2.0))
-    same = {"vignetting", "exposure_drift", "exposure_s", "disparity_step_px", "range_m"}
+    same = {"vignetting", "exposure_drift", "exposure_s", "gamma", "disparity_step_px", "range_m"}
     same |= {"grazing_limit_deg", "grazing_spread_deg"}
     for sensor in ("image", "depth", "imu"):
         for name, value in (asdict(preset)[sensor] or {}).items():

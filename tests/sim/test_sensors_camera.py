@@ -1,18 +1,24 @@
 """The camera's faults have the size and the direction that they should have."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from sim.sensors.camera import MAX_SAMPLES, ExposureDrift, ImageSensor, pixel_motion
+from sim.sensors.auto_exposure import Exposure
+from sim.sensors.camera import MAX_SAMPLES, ExposureDrift, ImageSensor
 from sim.sensors.hashed_noise import gaussian, noise_key
+from sim.sensors.pixel_motion import pixel_motion
 from sim.sensors.pixel_rays import PixelRays
 from sim.sensors.presets import HARSH, NOMINAL, ImageNoise
 
 CAMERA = PinholeCamera(80, 60, 70.0, 72.0, 39.0, 30.5)
 RAYS = PixelRays(CAMERA)
 STILL = SE3.identity()
+assert HARSH.image is not None
+HARSH_NOISE = HARSH.image
 FAULTLESS = ImageNoise(0.0, 0.0, 0.0, 0.0, 0.01)
 
 
@@ -74,6 +80,37 @@ def test_noise_at_mid_grey(noise: ImageNoise, deviation: float) -> None:
     assert abs(np.corrcoef(error[:, 1:].ravel(), error[:, :-1].ravel())[0, 1]) < 0.05
 
 
+@pytest.mark.parametrize("gain", [1.0, 2.0, 4.0])
+def test_gain_multiplies_noise(gain: float) -> None:
+    """The same grey level from a shorter exposure and a gain: less light, so more shot noise."""
+    noise = ImageNoise(1.0, 0.0235, 0.0, 0.0, 0.008)
+    grey = np.full((60, 80, 3), 128, np.uint8)
+    depth = np.ones((60, 80), np.float32)
+    sensor = ImageSensor.of(RAYS, noise, rng())
+    image = sensor.expose(grey, depth, STILL, 0.0, rng(), Exposure(0.008 / gain, gain))
+    error = image.astype(float) - 128
+    assert error.std() == pytest.approx(np.hypot(gain, np.sqrt(gain * 0.0235 * 128)), rel=0.05)
+    assert abs(error.mean()) < 0.1 * gain
+
+
+def test_light_beyond_white_saturates() -> None:
+    ramp = np.tile(np.arange(80, dtype=np.uint8)[None, :, None] * 3, (60, 1, 1))
+    depth = np.ones((60, 80), np.float32)
+    sensor = ImageSensor.of(RAYS, FAULTLESS, rng())
+    image = sensor.expose(ramp, depth, STILL, 0.0, rng(), Exposure(0.04))
+    np.testing.assert_array_equal(image, np.minimum(ramp.astype(int) * 4, 255))
+    assert (image == 255).mean() > 0.7
+
+
+@pytest.mark.parametrize("gamma", [0.5, 2.2])
+def test_gamma_bends_every_grey_level(gamma: float) -> None:
+    ramp = np.tile(np.arange(240, dtype=np.uint8)[None, :80, None] * 3, (60, 1, 1))
+    depth = np.ones((60, 80), np.float32)
+    sensor = ImageSensor.of(RAYS, replace(FAULTLESS, gamma=gamma), rng())
+    image = sensor.expose(ramp, depth, STILL, 0.0, rng())
+    np.testing.assert_array_equal(image, np.rint(255 * (ramp / 255) ** (1 / gamma)))
+
+
 def test_vignetting_darkens_the_corners_by_its_share() -> None:
     noise = ImageNoise(0.0, 0.0, 0.2, 0.0, 0.0)
     white = np.full((60, 80, 1), 200, np.uint8)
@@ -121,6 +158,7 @@ def exposed_pixel_by_pixel(
     motion: np.ndarray,
     time_s: float,
     keys: list[np.uint64],
+    exposure: Exposure,
 ) -> np.ndarray:
     """The obvious twin of `ImageSensor.expose`: one pixel after the other, in double precision."""
     height, width, channels = sharp.shape
@@ -138,30 +176,43 @@ def exposed_pixel_by_pixel(
             top, bottom = a + (x - x0) * (b - a), c + (x - x0) * (d - c)
             light += (top + (y - y0) * (bottom - top)) / count
         light *= sensor.drift.gain(time_s) * sensor.vignette[row, column]
+        # Before the amplifier, with read noise and with shot noise by the light collected.
+        light *= exposure.exposure_s / sensor.noise.exposure_s
         deviation = np.sqrt(sensor.noise.read_noise**2 + sensor.noise.shot_noise * light)
         noisy = light + deviation * gaussian(keys[channel], row * width + column)
-        image[row, column, channel] = np.clip(np.floor(noisy + 0.5), 0, 255)
+        seen = np.clip(exposure.gain * noisy / 255, 0, 1) ** (1 / sensor.noise.gamma)
+        image[row, column, channel] = np.floor(255 * seen + 0.5)
     return image
 
 
 @pytest.mark.kernel
 @pytest.mark.filterwarnings("ignore:overflow")  # of the hash, without the compiler
-@pytest.mark.parametrize("channels", [1, 3])
-def test_exposure_is_that_of_the_obvious_twin(channels: int) -> None:
+@pytest.mark.parametrize(
+    ("channels", "gamma", "exposure"),
+    [
+        (1, 1.0, Exposure(HARSH_NOISE.exposure_s)),
+        (3, 1.0, Exposure(HARSH_NOISE.exposure_s)),
+        (1, 0.85, Exposure(HARSH_NOISE.exposure_s)),
+        (3, 2.2, Exposure(0.4 * HARSH_NOISE.exposure_s, 1.7)),
+    ],
+)
+def test_exposure_is_that_of_the_obvious_twin(
+    channels: int, gamma: float, exposure: Exposure
+) -> None:
     """Up to rounding: float32 may fall on the other side of half a grey level."""
     camera = PinholeCamera(24, 18, 30.0, 31.0, 11.0, 9.5)
     sharp = rng().integers(0, 256, (18, 24, channels), np.uint8)
     depth = rng().uniform(0.3, 4.0, (18, 24)).astype(np.float32)
     depth[5:8, 3:9] = np.nan
     T_start_end = SE3.exp([0.06, -0.02, 0.03, 0.01, 0.02, -0.05])
-    sensor = ImageSensor.of(PixelRays(camera), HARSH.image, rng())
+    sensor = ImageSensor.of(PixelRays(camera), replace(HARSH_NOISE, gamma=gamma), rng())
     motion = np.moveaxis(pixel_motion(depth, PixelRays(camera), T_start_end), 0, -1)
     assert np.abs(motion).max() > 5
     assert np.abs(motion).min() < 0.5
     draw = rng()
     twin = exposed_pixel_by_pixel(
-        sensor, sharp, motion, 1.5, [noise_key(draw) for _ in range(channels)]
+        sensor, sharp, motion, 1.5, [noise_key(draw) for _ in range(channels)], exposure
     )
-    image = sensor.expose(sharp, depth, T_start_end, 1.5, rng())
+    image = sensor.expose(sharp, depth, T_start_end, 1.5, rng(), exposure)
     assert np.abs(image - twin).max() <= 1
     assert (image != twin).mean() < 0.005

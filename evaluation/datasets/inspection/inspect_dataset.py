@@ -16,6 +16,7 @@ from airground.io.layout import HEADER
 from airground.io.open_recording import layout_of, open_robot, unknown_layout
 from airground.io.recording import Recording
 from airground.io.robot_recording import RobotRecording
+from evaluation.datasets.inspection.exposure import look_at_exposure
 from evaluation.datasets.inspection.findings import Finding, Verdict, look_at_stamps
 from evaluation.datasets.inspection.truth_against_images import (
     hold_truth_against_images,
@@ -125,6 +126,7 @@ def _robot(path: Path, robot: Source, opener: Opener) -> list[Finding]:
             findings.append(_depth(part, recording))
         true_pose = true_camera(recording)
         findings.append(look_at_truth(part, recording, true_pose))
+        findings += look_at_exposure(part, recording)
         if true_pose is not None:
             findings.append(hold_truth_against_images(part, recording, true_pose))
     except RecordingError as error:

@@ -13,10 +13,12 @@ from sim.appearance.other_light import later_light, light_between
 from sim.scene import MAX_HEAP_HEIGHT_M, Light, Scene
 from sim.sensors.presets import (
     SensorPreset,
+    with_auto_exposure,
     with_depth_camera,
     with_distortion,
     with_dropped,
     with_fisheye,
+    with_gamma,
     with_heading_error,
     with_imu_gap,
     with_noise,
@@ -155,6 +157,20 @@ DIALS = (
         "1 if the Kinect's driver moves depth to the colour camera's pixels, 0 if depth is stored "
         "as the depth camera measures it",
         lambda subject, value: _depth_camera(subject, depth_registered=value >= 0.5),
+    ),
+    Dial(
+        "sensors.auto_exposure", "", 0.0, 1.0,
+        "automatic exposure of both cameras: share of the corrections of exposure and gain, in "
+        "stops, that `real` makes, with its delay and overshoot; 0 is a fixed exposure",
+        lambda subject, value: replace(
+            subject, sensors=with_auto_exposure(subject.sensors, value)
+        ),
+    ),
+    Dial(
+        "sensors.gamma", "", 0.4, 2.5,
+        "gamma of both cameras' response, beside the 2.2 of pictures; 1 shows light as it is, more "
+        "brightens what is dark",
+        lambda subject, value: replace(subject, sensors=with_gamma(subject.sensors, value)),
     ),
     Dial(
         "sensors.dropped_s", "s", 0.0, 5.0,

@@ -15,6 +15,7 @@ from evaluation.measure.plans.sweep import SweepPlan, Vary, parse_vary, points
 from evaluation.measure.protocol.trials import Protocol
 from evaluation.setup.setups import Setup
 from sim.scene import load_scene
+from sim.sensors.auto_exposure import CONSUMER_EXPOSURE
 from sim.sensors.presets import NOMINAL, NONE
 
 TINY = load_scene("tiny")
@@ -117,6 +118,8 @@ def test_dials_turn_what_they_name() -> None:
         "sensors.fisheye": 0.9,
         "sensors.depth_baseline_mm": 50.0,
         "sensors.depth_registered": 0.0,
+        "sensors.auto_exposure": 0.5,
+        "sensors.gamma": 0.8,
         "sensors.dropped_s": 2.0,
         "sensors.imu_gap_s": 0.5,
         "sensors.heading_error_deg": 5.0,
@@ -138,6 +141,8 @@ def test_dials_turn_what_they_name() -> None:
     assert subject.sensors.image is not None
     assert subject.sensors.magnetic is not None
     assert subject.sensors.image.read_noise == 2 * NOMINAL.image.read_noise  # type: ignore[union-attr]
+    assert subject.sensors.image.gamma == 0.8
+    assert subject.sensors.exposure == replace(CONSUMER_EXPOSURE, strength=0.5)
     optics = subject.sensors.mav_optics, subject.sensors.ground_optics
     assert {(o.lens, o.distortion, o.readout_s) for o in optics} == {("equidistant", 0.9, 0.02)}
     assert (subject.sensors.depth_baseline_m, subject.sensors.depth_registered) == (0.05, False)
