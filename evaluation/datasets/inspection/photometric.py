@@ -2,8 +2,8 @@
 
 An image is warped into another one by its depth and the true poses. If pose, depth, calibration and
 stamps are right, their difference is lowest there, and higher with poses turned so that everything
-lies two pixels beside. The minimum of the parabola through these three errors is the error of the
-truth in pixels."""
+lies two pixels beside. The turn that fits best, found by Gauss-Newton from the best of such places,
+is the error of the truth in pixels."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from scipy.ndimage import map_coordinates
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
+from sim.recording.row_poses import RowPoses
 
 SHIFT_PX = 2.0
 SMOOTHING_PX = 1.5
@@ -34,6 +35,12 @@ MIN_SHARED = 0.2
 """Share of one image that the other shows; with less, the pose is not that of this camera."""
 MIN_MOTION_PX = 4.0
 """Least median motion of pixels between two images: with less, any pose would fit."""
+FINE_STEPS, FINE_PX = 20, 1e-3
+"""Most steps of the fit, and the step that ends it [px]."""
+HUBER = 1.345
+"""Residuals beyond this many deviations count less: what one image hides, or reflects."""
+SHUTTER_STEPS = 3
+"""Corrections of the row in which a rolling shutter sees a point: each leaves a twentieth."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +50,14 @@ class Posed:
     Attributes:
         grey: (H, W) uint8 image.
         depth: (H, W) float32 depth [m], NaN where unknown.
-        T_world_camera: True pose.
+        T_world_camera: True pose, of the middle row.
+        rows: Poses of all rows in the frame of that pose; None with a global shutter.
     """
 
     grey: NDArray[np.uint8]
     depth: NDArray[np.float32]
     T_world_camera: SE3
+    rows: RowPoses | None = None
 
 
 @dataclass(frozen=True)
@@ -76,11 +85,14 @@ class Comparison:
             px: (_smooth(first.grey, px), _smooth(second.grey, px))
             for px in (SMOOTHING_PX, COARSE_SMOOTHING_PX)
         }
-        self._camera = camera
+        self._camera, self._rows = camera, second.rows
         rows, columns = np.nonzero(_edges(first.grey) & np.isfinite(first.depth))
         every = slice(None, None, 1 + len(rows) // MAX_PIXELS)
         self._at = rows[every], columns[every]
         points_first = camera.rays()[self._at] * first.depth[self._at].astype(float)[:, None]
+        if first.rows is not None:
+            rotations, places = first.rows.at(self._at[0].astype(float))
+            points_first = np.einsum("nij,nj->ni", rotations, points_first) + places
         T_second_first = second.T_world_camera.inverse() @ first.T_world_camera
         self._points = T_second_first @ points_first
 
@@ -89,7 +101,7 @@ class Comparison:
 
     def moved_px(self) -> NDArray[np.float64]:
         """(N,) motion of each pixel by the truth; NaN for those that leave the image."""
-        pixels, camera = self._camera.project(self._points), self._camera
+        pixels, camera = self._project(self._points), self._camera
         inside = (pixels >= 0) & (pixels <= [camera.width - 1, camera.height - 1])
         start = np.stack([self._at[1], self._at[0]], axis=1)
         return np.where(inside.all(axis=1), np.linalg.norm(pixels - start, axis=1), np.nan)
@@ -97,9 +109,50 @@ class Comparison:
     def error(self, x_px: float, y_px: float, smoothing_px: float = SMOOTHING_PX) -> float:
         """Difference of the images with the pose turned by an offset in pixels."""
         here, there = self._smooth[smoothing_px]
-        camera = self._camera
-        turn = SE3.from_rotation_vector((-y_px / camera.fy, x_px / camera.fx, 0.0))
-        return _difference(here[self._at], _sample(there, camera.project(turn @ self._points)))
+        points = self._turned(x_px, y_px) @ self._points
+        return _difference(here[self._at], _sample(there, self._project(points)))
+
+    def fitted(self, x_px: float, y_px: float) -> NDArray[np.float64]:
+        """(2,) the offset [px] near a start at which the images differ least, brightness and
+        contrast apart; the start, if there is none within `SHIFT_PX`."""
+        here, there = self._smooth[SMOOTHING_PX]
+        slopes = [_slope(there, *axis) for axis in ((1, 0), (0, 1))]
+        wanted, start = here[self._at], np.array([x_px, y_px])
+        offset, weights = start, np.ones(len(self))
+        for _ in range(FINE_STEPS):
+            pixels = self._project(self._turned(*offset) @ self._points)
+            seen, *slope = (_sample(image, pixels) for image in (there, *slopes))
+            # wanted = contrast * (seen + slope . step) + brightness
+            model = np.stack([*slope, seen, np.ones(len(self))], axis=1)
+            both = np.isfinite(model).all(axis=1)
+            root = np.sqrt(weights[both])[:, None]
+            found, *_ = np.linalg.lstsq(root * model[both], root[:, 0] * wanted[both], rcond=None)
+            misfit = np.abs(np.where(both, wanted - model @ found, 0.0))
+            deviation = 1.4826 * np.median(misfit[both]) + 1e-9
+            weights = np.minimum(1.0, HUBER * deviation / np.maximum(misfit, 1e-9))
+            step = found[:2] / found[2] if found[2] > 0 else np.full(2, np.inf)
+            offset = offset + step
+            if not np.abs(offset - start).max() <= SHIFT_PX:
+                return start
+            if np.abs(step).max() < FINE_PX:
+                break
+        return offset
+
+    def _turned(self, x_px: float, y_px: float) -> SE3:
+        return SE3.from_rotation_vector((-y_px / self._camera.fy, x_px / self._camera.fx, 0.0))
+
+    def _project(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(N, 2) pixels of points in the second camera at its middle row; with a rolling shutter
+        each is seen from the pose of the row that it falls into."""
+        pixels = self._camera.project(points)
+        if self._rows is None:
+            return pixels
+        last = self._camera.height - 1
+        for _ in range(SHUTTER_STEPS):
+            rotations, places = self._rows.at(np.clip(np.nan_to_num(pixels[:, 1]), 0, last))
+            seen = np.einsum("nji,nj->ni", rotations, points - places)
+            pixels = self._camera.project(seen)
+        return pixels
 
 
 def fit(first: Posed, second: Posed, camera: PinholeCamera) -> Fit | None:
@@ -118,7 +171,7 @@ def fit(first: Posed, second: Posed, camera: PinholeCamera) -> Fit | None:
     if np.isnan(coarse[0.0, 0.0]):
         return None
     x, y = min(coarse, key=lambda place: np.nan_to_num(coarse[place], nan=np.inf))
-    # Descend from there: the coarse steps are wider than the parabola.
+    # Descend from there: the coarse steps are wider than the reach of the fit.
     best = compared.error(x, y)
     for _ in range(MAX_STEPS):
         places = [(x + dx, y + dy) for dx, dy in BESIDE]
@@ -126,10 +179,7 @@ def fit(first: Posed, second: Posed, camera: PinholeCamera) -> Fit | None:
         if not np.isfinite([best, *beside]).all():
             return None
         if min(beside) >= best:
-            offset = np.array(
-                [x + _lowest(beside[0], best, beside[1]), y + _lowest(beside[2], best, beside[3])]
-            )
-            return Fit(offset, float(np.mean(beside)) / max(best, 1e-9))
+            return Fit(compared.fitted(x, y), float(np.mean(beside)) / max(best, 1e-9))
         best = min(beside)
         x, y = places[int(np.argmin(beside))]
     return None
@@ -154,6 +204,10 @@ def _edges(grey: NDArray[np.uint8]) -> NDArray[np.bool_]:
     return strength > np.quantile(strength, 1 - EDGES)
 
 
+def _slope(image: NDArray[np.float32], along_x: int, along_y: int) -> NDArray[np.float32]:
+    return np.asarray(cv2.Sobel(image, cv2.CV_32F, along_x, along_y, scale=1 / 8), np.float32)
+
+
 def _smooth(grey: NDArray[np.uint8], by_px: float) -> NDArray[np.float32]:
     smooth = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), by_px)
     return np.asarray(smooth, np.float32)
@@ -172,9 +226,3 @@ def _difference(here: NDArray, there: NDArray) -> float:
         return float("nan")
     a, b = here[both], there[both]
     return float(np.abs((a - a.mean()) / a.std() - (b - b.mean()) / (b.std() + 1e-9)).mean())
-
-
-def _lowest(before: float, here: float, after: float) -> float:
-    """Minimum of the parabola through errors at -SHIFT, 0 and SHIFT [px]."""
-    bend = before - 2 * here + after
-    return SHIFT_PX * (before - after) / (2 * bend) if bend > 0 else 0.0

@@ -7,19 +7,23 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from airground.core.cloud import Source
-from airground.core.messages import GroundImage
+from airground.core.messages import GroundImage, RobotCalibration
 from airground.core.se3 import SE3
 from airground.io.robot_recording import RobotRecording
 from evaluation.datasets.inspection.findings import Finding, Verdict
 from evaluation.datasets.inspection.photometric import SHIFT_PX, Fit, Posed, fits
 from evaluation.table.tracked_share import TruePose
+from sim.recording.row_poses import RowPoses
 from sim.recording.truth import Truth
 
 PAIRS = 12
 APART = 8
 """Distance of the two images of a pair, in images."""
+ROW_POSES = 9
+"""Poses that are looked up of a rolling shutter's image: one each 4 ms at 30 ms."""
 MIN_FITS = 3
 MAX_OFFSET_PX = 1.0
 MAX_MEASURED_OFFSET_PX = 10.0
@@ -77,13 +81,39 @@ def _fits(recording: RobotRecording, true_pose: TruePose) -> list[Fit]:
     depth_of = _depth(recording)
 
     def posed(index: int) -> Posed | None:
-        T_world_camera = true_pose(int(recording.camera_stamps[index]))
-        if T_world_camera is None:
+        stamp_ns = int(recording.camera_stamps[index])
+        T_world_camera = true_pose(stamp_ns)
+        rows = _row_poses(recording.calibration, true_pose, stamp_ns)
+        if T_world_camera is None or (recording.calibration.readout_s and rows is None):
             return None
-        grey, depth = depth_of(index, T_world_camera)
-        return Posed(grey, depth, T_world_camera)
+        grey, depth = depth_of(index, T_world_camera, rows)
+        return Posed(grey, depth, T_world_camera, rows)
 
     return fits(posed, pairs, recording.calibration.camera)
+
+
+def _row_poses(
+    calibration: RobotCalibration, true_pose: TruePose, stamp_ns: int
+) -> RowPoses | None:
+    """Poses of a rolling shutter's rows in the frame of the middle one; None with a global shutter,
+    or where one is unknown. Between `ROW_POSES` of them the camera moves evenly."""
+    if not calibration.readout_s:
+        return None
+    share = np.linspace(-0.5, 0.5, ROW_POSES)
+    times = stamp_ns + np.rint(share * calibration.readout_s * 1e9).astype(int)
+    poses = [true_pose(int(time_ns)) for time_ns in times]
+    middle = true_pose(stamp_ns)
+    if middle is None:
+        return None
+    moved = []
+    for pose in poses:
+        if pose is None:
+            return None
+        T_middle_row = middle.inverse() @ pose
+        moved.append([*T_middle_row.translation, *T_middle_row.rotation_vector()])
+    rows = np.linspace(-0.5, 0.5, calibration.camera.height)
+    each = np.array([np.interp(rows, share, of_axis) for of_axis in np.array(moved).T]).T
+    return RowPoses(Rotation.from_rotvec(each[:, 3:]).as_matrix(), each[:, :3])
 
 
 def _offset_px(found: list[Fit]) -> float:
@@ -116,17 +146,24 @@ def _verdict(offset_px: float, layout: str) -> Verdict:
 Seen = tuple[NDArray[np.uint8], NDArray[np.float32]]
 
 
-def _depth(recording: RobotRecording) -> Callable[[int, SE3], Seen]:
+def _depth(
+    recording: RobotRecording,
+) -> Callable[[int, SE3, RowPoses | None], Seen]:
     """Reader of grey image and depth: measured, or of the true surface if the robot has none."""
     truth = None if recording.robot == Source.GROUND else Truth.open(recording.path)
     camera = recording.calibration.camera
 
-    def seen(index: int, T_world_camera: SE3) -> Seen:
+    def seen(index: int, T_world_camera: SE3, rows: RowPoses | None) -> Seen:
         image = recording.read_image(index)
         if isinstance(image, GroundImage):
             grey = cv2.cvtColor(image.colour, cv2.COLOR_RGB2GRAY)
             return np.asarray(grey, np.uint8), image.depth
         assert truth is not None
-        return image.image, truth.surface("mav").cast(camera, T_world_camera)
+        surface = truth.surface("mav")
+        if rows is None:
+            return image.image, surface.cast(camera, T_world_camera)
+        rays = rows.seen_from(T_world_camera.inverse()).rays_world(camera.rays())
+        hit = surface.scene.cast_rays(rays)["t_hit"].numpy()
+        return image.image, np.where(np.isfinite(hit), hit, np.float32(np.nan))
 
     return seen
