@@ -117,23 +117,27 @@ class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
 
 @dataclass(frozen=True, kw_only=True)
 class Render(Verb):
-    """Add exact truth of every pixel, or a lidar's scans, to a recording.
+    """Add exact truth of every pixel, a lidar's scans or stereo pairs to a recording.
 
-    Depth, normals, segmentation and optical flow of both robots' images, and scans of a rotating
-    lidar on the ground robot. All follow from the stored motion and surface, without simulating
-    again. docs/datasets.md has the encodings.
+    Depth, normals, segmentation and optical flow of both robots' images, scans of a rotating
+    lidar on the ground robot, and images of a second camera beside each robot's. All follow from
+    the stored motion; stereo builds the world again. docs/datasets.md has the encodings.
     """
 
     recording: Annotated[Positional[Path], Shown("RECORDING")]
     """folder that simulate has written"""
     add: Annotated[str, Shown("LIST")]
-    """what to add, of depth, normals, segmentation, flow, lidar; as in depth,flow"""
+    """what to add, of depth, normals, segmentation, flow, lidar, stereo; as in depth,flow"""
     robot: Literal["mav", "ground", "both"] = "both"
     """robot whose images are rendered"""
     every: Annotated[int, Shown("N")] = 1
     """every so many-th image or scan; flow leads to the next of all images"""
     beams: Annotated[int | None, Shown("N", "32")] = None
     """beams of the lidar, 16 to 128"""
+    baseline: Annotated[float | None, Shown("M", "0.11, as EuRoC's")] = None
+    """distance of the second camera of stereo pairs, to the right [m]"""
+    scene: Annotated[str | None, Shown("FILE", "the package's scene of that name")] = None
+    """scene that the recording is of, for stereo: a .toml file"""
     out: Annotated[Path | None, Shown("DIR", "truth/ in the recording")] = None
     """folder for ROBOT_depth/, ground_lidar/ and so on; these must not exist"""
 
@@ -141,12 +145,15 @@ class Render(Verb):
         from evaluation.datasets.lidar_files import count_scans, render_scans
         from evaluation.datasets.pixel_truth_files import (
             LIDAR,
+            MODALITIES,
+            STEREO,
             Wanted,
             count_images,
             parse_modalities,
             render_truth,
         )
         from evaluation.datasets.simulated import Simulated
+        from evaluation.datasets.stereo_files import BASELINE_M, count_pairs, render_stereo
         from evaluation.setup.progress import step
         from sim.robots.motion import ROBOTS
         from sim.sensors.lidar import Lidar
@@ -154,11 +161,15 @@ class Render(Verb):
         robots = ROBOTS if self.robot == "both" else (self.robot,)
         every = int(in_range("--every", self.every, low=1))
         added = parse_modalities(self.add)
-        wanted = Wanted(robots, tuple(name for name in added if name != LIDAR), every)
+        wanted = Wanted(robots, tuple(name for name in added if name in MODALITIES), every)
         if LIDAR in added and "ground" not in robots:
             raise InputError("--add lidar: the ground robot carries it; give no --robot mav")
         if self.beams is not None and LIDAR not in added:
             raise InputError("--beams: only with --add lidar")
+        if STEREO not in added and (self.baseline is not None or self.scene is not None):
+            raise InputError("--baseline and --scene: only with --add stereo")
+        baseline_m = BASELINE_M if self.baseline is None else self.baseline
+        in_range("--baseline", baseline_m, low=0.001, high=5.0)
         lidar = Lidar() if self.beams is None else Lidar(beams=self.beams)
         simulated = Simulated.open(self.recording)
         out = simulated.truth.folder if self.out is None else self.out
@@ -168,6 +179,11 @@ class Render(Verb):
         if LIDAR in added:
             with step("scanning", count_scans(simulated, lidar, every), "scans") as scanning:
                 render_scans(simulated, lidar, every, out, scanning.advance)
+        if STEREO in added:
+            with step("drawing pairs", count_pairs(simulated, wanted), "images") as drawing:
+                render_stereo(
+                    simulated, wanted, baseline_m, self.scene, out, self.workers(), drawing.advance
+                )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -30,8 +30,9 @@ from sim.robots.motion import Robot
 
 MODALITIES = ("depth", "normals", "segmentation", "flow")
 LIDAR = "lidar"
-KNOWN = (*MODALITIES, LIDAR)
-"""What can be added to a recording: truth of every pixel, and scans of a lidar."""
+STEREO = "stereo"
+KNOWN = (*MODALITIES, LIDAR, STEREO)
+"""What can be added to a recording: truth of every pixel, scans of a lidar, and right images."""
 FLOW_STEP_PX = 1 / 64
 """Resolution of KITTI's 16-bit flow [px]."""
 _FLOW_ZERO, _NORMAL_ZERO = 32768, 32768

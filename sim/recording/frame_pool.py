@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, nullcontext
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.errors import AirgroundError
+from airground.io.png_encoder import encode_png
 from sim.interrupts import deaf_children, end_with_parent
 from sim.recording.frames import FrameMaker, FramePlan, Written
 from sim.recording.render import draw_with
@@ -92,6 +93,39 @@ def make_frames(plan: FramePlan, pool: FrameWorkers | None) -> Iterator[list[Wri
         raise pool.died() from None
 
 
+Picture = tuple[Robot, int, Path]
+"""Robot, frame, and the file for its image."""
+
+
+def make_pictures(
+    plan: FramePlan, pictures: Sequence[Picture], pool: FrameWorkers | None
+) -> Iterator[int]:
+    """Write images, without depth; yields how many were written, a few at a time, in any order.
+
+    Args:
+        plan: Frames to choose from.
+        pictures: Images to write.
+        pool: Processes that make them; None is this process.
+
+    Raises:
+        AirgroundError: A process died, as when memory runs out.
+    """
+    tasks = [
+        pictures[first : first + FRAMES_PER_TASK]
+        for first in range(0, len(pictures), FRAMES_PER_TASK)
+    ]
+    if pool is None:
+        with FrameMaker(plan) as maker:
+            for task in tasks:
+                yield _write_pictures(maker, task)
+        return
+    try:
+        for future in as_completed([pool.submit(_work_on_pictures, plan, t) for t in tasks]):
+            yield future.result()
+    except BrokenProcessPool:
+        raise pool.died() from None
+
+
 class FrameServer:
     """Gives a plan's frames as they are asked for, drawn a little ahead by other processes.
 
@@ -149,6 +183,12 @@ def _make(maker: FrameMaker, task: Task) -> list[Written]:
     return [written for index in range(first, end) for written in maker.make(robot, index)]
 
 
+def _write_pictures(maker: FrameMaker, task: Sequence[Picture]) -> int:
+    for robot, index, file in task:
+        file.write_bytes(encode_png(maker.picture(robot, index)))
+    return len(task)
+
+
 _maker: tuple[Path, FrameMaker] | None = None  # one a process, of the plan with this recording
 
 
@@ -174,6 +214,10 @@ def _maker_of(plan: FramePlan) -> FrameMaker:
 
 def _work(plan: FramePlan, task: Task) -> list[Written]:
     return _make(_maker_of(plan), task)
+
+
+def _work_on_pictures(plan: FramePlan, task: Sequence[Picture]) -> int:
+    return _write_pictures(_maker_of(plan), task)
 
 
 def _draw(plan: FramePlan, robot: Robot, index: int) -> Any:

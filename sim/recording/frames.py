@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from airground.core.se3 import SE3
 from airground.io import layout
 from airground.io.calibration import CalibrationTable, GroundTable, RobotTable
 from airground.io.digests import bytes_digest
@@ -50,6 +51,8 @@ class FramePlan:
         unlit: What the ground robot sees, without light, for the lamp that it carries.
         lamp: The lamp; None without one.
         shadows: The MAV's shadow in the light that each robot sees; none if it throws none.
+        baseline_m: Distance of each camera to the right of its own place, along its x axis, for
+            the right images of stereo pairs [m]; their noise is their own.
         true: True calibration of the sensors.
         driver: Nominal calibration by which depth is registered; None if it is not.
         taken_ns: Nominal stamps at which each robot's camera takes an image [ns].
@@ -70,6 +73,7 @@ class FramePlan:
     lamp: CarriedLamp | None = None
     shadows: Mapping[Robot, DroneShadow] = field(default_factory=dict)
     exposures: Mapping[Robot, ExposureCourse] = field(default_factory=dict)
+    baseline_m: float = 0.0
 
     def world_files(self) -> set[WorldFiles]:
         """Files of all worlds."""
@@ -110,6 +114,10 @@ class FrameMaker:
     def __init__(self, plan: FramePlan) -> None:
         self._plan = plan
         self._motion = Motion.load(plan.motion)
+        if plan.baseline_m:
+            T_camera_right = SE3(np.eye(3), np.array([plan.baseline_m, 0.0, 0.0]))
+            for robot in ROBOTS:
+                self._motion = self._motion.with_camera_moved(robot, T_camera_right)
         self._bodies = read_bodies(plan.motion.parent)
         # One world that both robots see is loaded once.
         edges = {files: Edges.load(files.edges) for files in plan.worlds.values()}
@@ -162,15 +170,29 @@ class FrameMaker:
     def ground(self, index: int) -> tuple[NDArray[np.uint8], NDArray[np.uint16]]:
         """(height, width, 3) RGB and (height, width) depth as PNG values, of the ground robot."""
         time_ns, rng = self.start("ground", index)
+        colour, depth = self._colour(time_ns, rng)
+        frames = self._plan.frames["ground"]
+        units = frames.depth_units(index, self.depth_camera.units(time_ns, depth, rng))
+        return frames.image(index, colour), units
+
+    def picture(self, robot: Robot, index: int) -> NDArray[np.uint8]:
+        """The image of a frame without depth: grey of the MAV, RGB of the ground robot."""
+        if robot == "mav":
+            return self.mav(index)
+        colour, _ = self._colour(*self.start("ground", index))
+        return self._plan.frames["ground"].image(index, colour)
+
+    def _colour(
+        self, time_ns: int, rng: np.random.Generator
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """The ground robot's colour image and the true depth of its pixels [m]."""
         colour, depth = self.views["ground"].draw(time_ns)
         if self._unlit is not None and self._plan.lamp is not None:
             unlit, _ = self._unlit.draw(time_ns)
             colour = self._plan.lamp.lit(colour, unlit, depth, self._lens("ground").rays())
         if "ground" in self._sensors:
             colour = self.expose("ground", colour, depth, time_ns, rng)
-        frames = self._plan.frames["ground"]
-        units = frames.depth_units(index, self.depth_camera.units(time_ns, depth, rng))
-        return frames.image(index, colour), units
+        return colour, depth
 
     def start(self, robot: Robot, index: int) -> tuple[int, np.random.Generator]:
         """When a frame is really taken [ns], and what its noise is drawn from."""
@@ -178,7 +200,9 @@ class FrameMaker:
         stamp = int(self._plan.taken_ns[robot][taken])
         # Noise depends on the frame alone, not on who makes it. Counted from 1, for numpy
         # takes [a] and [a, 0] as the same seed.
-        rng = np.random.default_rng([*self._plan.seeds, ROBOTS.index(robot) + 1, taken + 1])
+        right = [1] if self._plan.baseline_m else []
+        seed = [*self._plan.seeds, ROBOTS.index(robot) + 1, taken + 1, *right]
+        rng = np.random.default_rng(seed)
         return stamp + self._table(robot).camera.time_offset_ns, rng
 
     def _view(
