@@ -117,7 +117,7 @@ class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
 
 @dataclass(frozen=True, kw_only=True)
 class Render(Verb):
-    """Add truth of every pixel, a lidar's scans or stereo pairs to a recording.
+    """Add truth of pixels, lidar scans or stereo pairs to a recording.
 
     Depth, normals, segmentation and optical flow of both robots' images, scans of a rotating
     lidar on the ground robot, and images of a second camera beside each robot's. All follow from

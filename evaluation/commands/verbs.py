@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 JOBS: dict[str, dict[str, tuple[str, str]]] = {
     "data": {
         "simulate": ("data", "Record what the robots' sensors see in a scene, or in many."),
-        "render": ("data", "Add truth of every pixel, a lidar's scans or stereo pairs to a recording."),
+        "render": ("data", "Add truth of pixels, lidar scans or stereo pairs to a recording."),
         "inspect": ("data", "Say what is in a dataset, and what is wrong with it."),
         "export": ("data", "Write a recording, with its truth, in a format that other tools read."),
     },
