@@ -14,7 +14,7 @@ from airground.errors import AirgroundError, InputError
 from airground.io.layout import TRUTH
 from airground.io.recording import Recording
 from sim.recording.frames import FrameMaker, FramePlan
-from sim.recording.recorder import Flight, store_models, write_all_but_images
+from sim.recording.recorder import Flight, with_models, write_all_but_images
 from sim.recording.truth import Truth
 from sim.robots.motion import Robot
 
@@ -50,7 +50,7 @@ def redrawn(recording: Recording, flight: Flight, robots: Sequence[Robot]) -> It
                     raise InputError(
                         f"{recording.path}: made anew, it has another {key}: {_OTHERS}"
                     )
-            store_models(plan, plain)
+            plan = with_models(plan, plain)
         except OSError as error:
             raise AirgroundError(f"{root}: the worlds cannot be stored there: {error}") from None
         true = Truth.open(recording.path).calibration
