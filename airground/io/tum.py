@@ -5,6 +5,7 @@ Times are in seconds with nine decimals; they are read and written without round
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -51,30 +52,33 @@ def read_tum(path: Path | str) -> Trajectory:
                 f"{path}:{number}: expected 'timestamp tx ty tz qx qy qz qw', "
                 f"got {len(fields)} fields"
             )
-        try:
-            stamp = parse_stamp(fields[0])
-            values = np.array([float(field) for field in fields[1:]])
-        except ValueError as error:
-            raise RecordingError(f"{path}:{number}: {error}") from None
-        if not (np.abs(values) < FARTHEST_M).all():
-            raise RecordingError(
-                f"{path}:{number}: the pose at {fields[0]} s is not finite, or beyond "
-                f"{FARTHEST_M:g} m"
-            )
-        if abs(math.hypot(*values[3:]) - 1) > 1e-2:
-            raise RecordingError(
-                f"{path}:{number}: the quaternion (qx qy qz qw) must have length 1"
-            )
+        stamp, pose = parse_pose(fields, f"{path}:{number}")
         if stamps and stamp <= stamps[-1]:
             raise RecordingError(
                 f"{path}:{number}: time {fields[0]} s does not follow "
                 f"{format_stamp(stamps[-1])} s; times must strictly increase"
             )
         stamps.append(stamp)
-        poses.append(SE3.from_quaternion_xyzw(values[3:], values[:3]))
+        poses.append(pose)
     if not stamps:
         raise RecordingError(f"{path}: holds no pose")
     return Trajectory.from_poses(stamps, poses)
+
+
+def parse_pose(fields: Sequence[str], where: str) -> tuple[int, SE3]:
+    """Stamp [ns] and pose from `timestamp tx ty tz qx qy qz qw`; RecordingError names `where`."""
+    try:
+        stamp = parse_stamp(fields[0])
+        values = np.array([float(field) for field in fields[1:]])
+    except ValueError as error:
+        raise RecordingError(f"{where}: {error}") from None
+    if not (np.abs(values) < FARTHEST_M).all():
+        raise RecordingError(
+            f"{where}: the pose at {fields[0]} s is not finite, or beyond {FARTHEST_M:g} m"
+        )
+    if abs(math.hypot(*values[3:]) - 1) > 1e-2:
+        raise RecordingError(f"{where}: the quaternion (qx qy qz qw) must have length 1")
+    return stamp, SE3.from_quaternion_xyzw(values[3:], values[:3])
 
 
 def write_tum(path: Path | str, trajectory: Trajectory) -> None:

@@ -38,15 +38,31 @@ class DatasetOptions:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
+class BenchmarkOptions:
+    """Data of a benchmark."""
+
+    heading: ClassVar[str] = "benchmark (docs/score.md)"
+
+    level: Annotated[
+        Literal["paper", "easy", "medium", "hard", "extreme"] | None, Shown("NAME")
+    ] = None
+    """record flights of a level, over heaps that --seed draws, as 0001, 0002, ..."""
+    flights: Annotated[int | None, Shown("N", "the level's own")] = None
+    """with --level: flights over each of its scenes"""
+    sealed: Annotated[Path | None, Shown("DIR")] = None
+    """write the truth to this new folder, for score, and none into the recordings"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Simulate(BenchmarkOptions, DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
     """Record what the robots' sensors see in a scene, or in many.
 
     The recording opens in tools that read EuRoC and TUM RGB-D; the truth is apart in truth/. With
-    --seeds: a dataset of every scene with every seed, and its data sheet; given again after an
-    interruption, it makes what is missing.
+    --seeds: a dataset of every scene with every seed, and its data sheet. With --level: the
+    recordings of a benchmark. Both, given again after an interruption, make what is missing.
     """
 
-    scenes: Annotated[Positional[tuple[str, ...]], Shown("SCENE ...")]
+    scenes: Annotated[Positional[tuple[str, ...]], Shown("SCENE ...")] = ()
     """scenes of the package (an unknown name lists them), or .toml files"""
     duration_s: Annotated[float | None, Shown("S", "the scene's own")] = None
     """length of the recording [s]"""
@@ -58,22 +74,27 @@ class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
     def main(self) -> None:
         if self.duration_s is not None:
             in_range("--duration-s", self.duration_s, low=1.0)
-        if self.seeds is None:
+        if self.level is not None:
+            self._make_benchmark(self.level)
+        elif self.seeds is None:
             self._record_one()
         else:
             self._make_dataset(self.seeds)
 
     def _record_one(self) -> None:
         from airground.config import Config
+        from evaluation.datasets.sealed import record_sealed
         from evaluation.measure.plans.dials import Subject, parse_dials, turned
         from evaluation.setup.output import check_free
         from evaluation.setup.progress import announce, step
-        from sim.recording.recorder import record
+        from sim.recording.recorder import Flight, record
         from sim.scene import load_scene
         from sim.sensors.presets import sensor_preset
 
         if len(self.scenes) != 1 or self.split or self.jobs != 1:
-            raise InputError("several scenes, --split and --jobs: only with --seeds")
+            raise InputError("one SCENE; several scenes, --split and --jobs: only with --seeds")
+        if self.flights is not None:
+            raise InputError("--flights: only with --level")
         dials = parse_dials(self.dials)
         asked = Subject(load_scene(self.scenes[0]), sensor_preset(self.sensors), Config())
         subject, seed = turned(asked, dials), self.checked_seed()
@@ -83,6 +104,10 @@ class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
         seconds = self.duration_s or scene.duration_s
         expected_s = work_s(seconds * RENDER_S_PER_S, self.workers())
         announce(f"records {seconds:.0f} s over {scene.name}", expected_s)
+        if self.sealed is not None:
+            asked_for = Flight(scene, seed, flight, subject.sensors, self.duration_s, dials)
+            record_sealed(asked_for, self.out, self.sealed, self.workers())
+            return
         with step("rendering", unit="images") as rendering:
             record(
                 scene,
@@ -104,6 +129,8 @@ class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
 
         if not self.scenes or self.seed or self.flight or self.dials:
             raise InputError("--seeds: with at least one SCENE, no --seed, --flight or --dial")
+        if self.sealed is not None or self.flights is not None:
+            raise InputError("--seeds: without --sealed and --flights; --level makes a benchmark")
         plan = plan_dataset(
             self.scenes, parse_seeds(seeds), parse_split(self.split), self.sensors, self.duration_s
         )
@@ -113,6 +140,23 @@ class Simulate(DatasetOptions, SensorOption, SeedOption, OutOption, Verb):
         expected_s = work_s(seconds * RENDER_S_PER_S, self.workers())
         announce(f"records {len(plan.worlds)} worlds, {seconds:.0f} s in all", expected_s)
         make_dataset(plan, self.out, jobs, self.workers())
+
+    def _make_benchmark(self, name: str) -> None:
+        from evaluation.datasets.sealed import Draw, make_benchmark
+        from evaluation.measure.levels.level import load_level
+        from evaluation.setup.progress import announce
+
+        given = self.scenes, self.seeds, self.split, self.dials, self.flight, self.duration_s
+        if any(given) or self.jobs != 1 or self.sensors != "nominal":
+            raise InputError(f"--level {name}: fixes all but --flights, --seed, --sealed and --out")
+        level = load_level(name)
+        flights = level.flights if self.flights is None else self.flights
+        draw = Draw(level, int(in_range("--flights", flights, low=1)), self.checked_seed())
+        planned = [first for first, *_ in draw.tries()]
+        seconds = sum(flight.scene.duration_s for flight in planned)
+        expected_s = work_s(seconds * RENDER_S_PER_S, self.workers())
+        announce(f"records {len(planned)} flights, {seconds:.0f} s in all", expected_s)
+        make_benchmark(draw, self.out, self.sealed, self.workers())
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
@@ -117,7 +118,8 @@ class RerunOptions:
 class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption, OutOption, Verb):
     """Run the pipeline over a recording and measure it against the truth.
 
-    Leaves the map, trajectories, measurements and the report. Your own recordings need no truth.
+    Leaves the map, trajectories, claims, measurements and the report. Your own recordings, and
+    those of simulate --sealed, need no truth.
     """
 
     sections: ClassVar[tuple[str, ...]] = ("oracle", "rerun")
@@ -128,11 +130,16 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
     """leave out the images that a live run dropped (its dropped.json)"""
 
     def main(self) -> None:
+        from airground.io.recording import Recording
+
         match self.recording, self.mav, self.ground:
             case Path() as recording, *_ if not self.given_any():
-                self._run_simulated(recording)
+                if is_sealed(recording):
+                    self._run_pair(partial(Recording.open, recording), recording.resolve().name)
+                else:
+                    self._run_simulated(recording)
             case None, Path() as mav, Path() as ground:
-                self._run_own(mav, ground)
+                self._run_pair(partial(self.pair, mav, ground), f"{mav.name}, {ground.name}")
             case _:
                 raise InputError(
                     "give either RECORDING, or both --mav DIR and --ground DIR (with which alone "
@@ -169,7 +176,8 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
             summary = write_measured(folder, recording, result, drops, setup, seed, showcase)
         print_summary(summary)
 
-    def _run_own(self, mav: Path, ground: Path) -> None:
+    def _run_pair(self, opened: Callable[[], Pair], name: str) -> None:
+        """Run without truth over what `opened` gives, once the output folder is made."""
         from evaluation.run.own_pair import print_pair, run_pair, write_pair
         from evaluation.setup.output import fresh_folder
         from evaluation.setup.progress import announce
@@ -178,13 +186,12 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
 
         for word, needs in (("--drops", self.drops), ("--poses oracle", self.poses == "oracle")):
             if needs:
-                raise InputError(f"{word}: needs a recording that simulate has written")
+                raise InputError(f"{word}: needs a recording of simulate with its truth")
         setup = self._setup_with("")
         level, seed = self.settings().rerun.level, self.checked_seed()
         with fresh_folder(self.out) as folder:
-            pair = self.pair(mav, ground)
+            pair = opened()
             seconds = max(pair.mav.duration_s, pair.ground.duration_s)
-            name = f"{mav.name}, {ground.name}"
             announce(f"runs {recorded(name, seconds)}", START_S + seconds * RUN_S_PER_S)
             with self.watching(folder, name, pair, None, level) as onlookers:
                 result = run_pair(pair, setup, seed, onlookers)
@@ -203,6 +210,13 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
             raise InputError("--poses oracle: without files that replace a stage")
         words = ", ".join(filter(None, (variant, replaced)))
         return replace(setup, given=given if replaced else NOTHING, variant=words)
+
+
+def is_sealed(path: Path) -> bool:
+    """Whether it is a recording of simulate whose truth is elsewhere."""
+    from airground.io.layout import HEADER, TRUTH
+
+    return (path / HEADER).is_file() and not (path / TRUTH).exists()
 
 
 def simulated(path: Path) -> tuple[Recording, Truth]:

@@ -32,6 +32,13 @@ JOBS: dict[str, dict[str, tuple[str, str]]] = {
         "reproduce": ("reproduce", "Do all of it: the paper's protocol, from scenes to report."),
         "sweep": ("sweep", "Turn dials, and measure what that does: curves with intervals."),
     },
+    "benchmark": {
+        "submit": ("score", "Collect the claims of runs as a submission to score."),
+        "score": (
+            "score",
+            "Score submissions against the truth that simulate --sealed has put aside.",
+        ),
+    },
     "results": {
         "evaluate": ("results", "Put the results of one or more runs into one report."),
         "compare": ("results", "Draw two to four runs on one page: what changed, and by how much."),

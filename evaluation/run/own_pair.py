@@ -11,11 +11,13 @@ import numpy as np
 
 from airground.augmentation import AugmentedMap
 from airground.core.cloud import Source
+from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.errors import InputError
 from airground.io.ply import write_ply
 from airground.io.robot_recording import Pair
 from airground.io.tum import write_tum
+from evaluation.run.claim_log import CLAIMS, ClaimLog
 from evaluation.run.driver import drive, pipeline_for
 from evaluation.run.onlooker import Onlooker
 from evaluation.run.own_recordings import robot_summary, why_untracked, write_summary
@@ -24,6 +26,7 @@ from evaluation.run.surface_log import SurfaceLog
 from evaluation.run.tracking import TrackingHere, TrackingTask, localizer_rng
 from evaluation.setup.setups import Setup
 from evaluation.setup.text import TextTable, metres, percent, print_table, seconds
+from evaluation.table.answer_file import write_answers
 from evaluation.table.tracking_log import Tracked
 from evaluation.table.true_camera import true_camera
 
@@ -31,12 +34,13 @@ from evaluation.table.true_camera import true_camera
 @dataclass(frozen=True, eq=False)
 class PairResult:
     """What a run over two recordings leaves; `tracked` has the answers by robot ("mav",
-    "ground")."""
+    "ground"), and `claims` what `RunResult` has."""
 
     tracked: dict[str, Tracked]
     augmented: AugmentedMap
     events: PairEvents
     surfaces: SurfaceLog
+    claims: Sequence[tuple[int, SE3]] = ()
 
 
 def run_pair(pair: Pair, setup: Setup, seed: int, onlookers: Sequence[Onlooker] = ()) -> PairResult:
@@ -57,20 +61,23 @@ def run_pair(pair: Pair, setup: Setup, seed: int, onlookers: Sequence[Onlooker] 
                 )
     tracking = TrackingHere(TrackingTask(pair, None, setup, seed))
     pipeline = pipeline_for(pair, setup, localizer_rng(seed, flight=0))
-    events, surfaces = PairEvents(), SurfaceLog(pair.mav)
-    driven = drive(pair, tracking, pipeline, setup, [events, surfaces, *onlookers])
+    events, surfaces, claims = PairEvents(), SurfaceLog(pair.mav), ClaimLog()
+    driven = drive(pair, tracking, pipeline, setup, [events, surfaces, claims, *onlookers])
     for robot, tracked in driven.tracked.items():
         reason = why_untracked(pair.of(Source[robot.upper()]), tracked.front_end)
         if reason:
             raise InputError(reason)
-    return PairResult(driven.tracked, pipeline.augmented_map(), events, surfaces)
+    claimed = claims.claims(driven.tracked)
+    return PairResult(driven.tracked, pipeline.augmented_map(), events, surfaces, claimed)
 
 
 def write_pair(folder: Path, pair: Pair, setup: Setup, result: PairResult) -> dict[str, Any]:
     """Write the map, the trajectories and `summary.json`; returns the summary.
     Each robot leaves `ROBOT.tum` and `ROBOT_live.tum`; `T_ground_mav.tum` has the accepted
-    alignments by the stamps of their surfaces."""
+    alignments by the stamps of their surfaces, `claims.tum` what was claimed at each image."""
     augmented, events = result.augmented, result.events
+    if result.claims:
+        write_answers(folder / CLAIMS, result.claims)
     write_ply(folder / "augmented_map.ply", augmented.cloud_ground, augmented.sources)
     accepted = [alignment for alignment in events.alignments if alignment.accepted]
     if accepted:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from airground.augmentation import AugmentedMap
@@ -16,12 +16,14 @@ from airground.core.se3 import SE3
 from airground.core.sighting import Sighting
 from airground.io.ply import write_ply
 from airground.io.recording import Recording
+from evaluation.run.claim_log import CLAIMS, ClaimLog
 from evaluation.run.driver import Driven, drive, pipeline_for
 from evaluation.run.drops import DropList
 from evaluation.run.onlooker import STAGE_OF, Onlooker, Seen
 from evaluation.run.tracking import TrackingHere, TrackingTask, localizer_rng, write_paths
 from evaluation.run.tracking_apart import TrackingApart
 from evaluation.setup.setups import Setup
+from evaluation.table.answer_file import write_answers
 from evaluation.table.row_writer import RowWriter
 from evaluation.table.rows import ResultTable
 from evaluation.table.tracking_log import Tracked
@@ -39,12 +41,15 @@ class RunResult:
         tracked: Answers of the front ends, by robot ("mav", "ground").
         augmented: The augmented map.
         T_ground_mav: The newest accepted alignment; None where there is none.
+        claims: Poses of the MAV's camera in the ground robot's camera that were claimed, by stamp
+            of the MAV's image [ns].
     """
 
     table: ResultTable
     tracked: dict[str, Tracked]
     augmented: AugmentedMap
     T_ground_mav: SE3 | None
+    claims: Sequence[tuple[int, SE3]] = ()
 
 
 def run_recording(
@@ -72,11 +77,12 @@ def run_recording(
     """
     task = TrackingTask(recording, truth, setup, seed, drops)
     pipeline = pipeline_for(recording, setup, localizer_rng(seed, recording.flight))
-    rows = RunRows(recording, truth, setup)
+    rows, claims = RunRows(recording, truth, setup), ClaimLog()
     with TrackingApart(task) if apart else nullcontext(TrackingHere(task)) as tracking:
-        driven = drive(recording, tracking, pipeline, setup, [rows, *onlookers])
+        driven = drive(recording, tracking, pipeline, setup, [rows, claims, *onlookers])
     rows.add_run(driven)
-    return rows.result(driven.tracked, pipeline.augmented_map())
+    result = rows.result(driven.tracked, pipeline.augmented_map())
+    return replace(result, claims=claims.claims(driven.tracked))
 
 
 def measure(path: Path | str, config: Config | None = None, seed: int = 0) -> RunResult:
@@ -150,8 +156,11 @@ class RunRows:
 
 
 def write_run(folder: Path, recording: Recording, result: RunResult) -> None:
-    """Write `augmented_map.ply`, and `ROBOT.tum` and `ROBOT_live.tum` with poses of the bodies."""
+    """Write `augmented_map.ply`, `ROBOT.tum` and `ROBOT_live.tum` with poses of the bodies, and
+    `claims.tum` where anything was claimed."""
     augmented = result.augmented
+    if result.claims:
+        write_answers(folder / CLAIMS, result.claims)
     write_ply(folder / "augmented_map.ply", augmented.cloud_ground, augmented.sources)
     for name, tracked in result.tracked.items():
         write_paths(

@@ -55,7 +55,9 @@ class Truth:
         """The truth of the recording in this folder; AirgroundError if missing or damaged."""
         folder = Path(recording) / TRUTH
         if not folder.is_dir():
-            raise RecordingError(f"{folder}: this recording has no truth")
+            raise RecordingError(
+                f"{folder}: this recording has no truth (where it is sealed, that is elsewhere)"
+            )
         path = folder / "calibration.toml"
         calibration = parse_table(CalibrationTable, read_toml(path), path)
         return cls(folder, Motion.load(folder / "motion.npz"), calibration)

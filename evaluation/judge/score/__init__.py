@@ -1,0 +1,1 @@
+"""Scores of submissions: where each says that the MAV was, held against the truth."""

@@ -1,0 +1,55 @@
+"""Where a run claims that the MAV is, relative to the ground robot, image by image."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from airground.core.events import Aligned, BeliefUpdated
+from airground.core.se3 import SE3
+from evaluation.run.onlooker import Seen
+from evaluation.run.tracking import live_path
+from evaluation.table.tracking_log import Tracked
+
+CLAIMS = "claims.tum"
+"""Its file in the folder of a run."""
+LONGEST_GAP_NS = 100_000_000
+"""Between poses of the ground robot that are interpolated: three images at 30 Hz."""
+
+
+class ClaimLog:
+    """An onlooker that notes from when on which relation between the maps was claimed: that of the
+    newest accepted alignment, and before the first one that of the newest converged belief."""
+
+    def __init__(self) -> None:
+        self._claimed: list[tuple[int, SE3]] = []
+        self._is_aligned = False
+
+    def see(self, seen: Seen) -> None:
+        """Note one event."""
+        match seen.event:
+            case BeliefUpdated(belief=belief) if belief.converged and not self._is_aligned:
+                self._claimed.append((seen.frame.stamp_ns, belief.T_ground_mav))
+            case Aligned(alignment=alignment) if alignment.accepted:
+                self._is_aligned = True
+                self._claimed.append((seen.frame.stamp_ns, alignment.T_ground_mav))
+
+    def claims(self, tracked: Mapping[str, Tracked]) -> list[tuple[int, SE3]]:
+        """`T_ground_camera_mav_camera` of every image of the MAV with something claimed by then,
+        by live poses; the ground robot's are interpolated at the stamps [ns] of these images."""
+        mav, ground = (live_path(tracked[robot].front_end) for robot in ("mav", "ground"))
+        if mav is None or ground is None or not self._claimed:
+            return []
+        since = np.array([stamp for stamp, _ in self._claimed])
+        made: list[tuple[int, SE3]] = []
+        for index, stamp in enumerate(mav.stamps_ns.tolist()):
+            newest = int(np.searchsorted(since, stamp, side="right")) - 1
+            after = int(np.searchsorted(ground.stamps_ns, stamp))
+            if newest < 0 or not 0 < after < len(ground):
+                continue
+            if int(ground.stamps_ns[after] - ground.stamps_ns[after - 1]) > LONGEST_GAP_NS:
+                continue
+            T_ground_mav = self._claimed[newest][1]
+            made.append((stamp, ground.at(stamp).inverse() @ T_ground_mav @ mav[index]))
+        return made
