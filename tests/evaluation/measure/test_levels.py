@@ -28,7 +28,7 @@ NAMES = get_args(LevelName)
 DIGESTS = {
     "paper 1": "d965402b75c29696",
     "easy 1": "accc3444c4683e55",
-    "medium 1": "ea40a3eece59f887",
+    "medium 1": "d2f42717acc7119a",
     "hard 1": "086de16413d2d661",
     "extreme 1": "367fb218bf932290",
 }
