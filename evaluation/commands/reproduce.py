@@ -93,10 +93,9 @@ class Reproduce(
     """Do all of it: the paper's protocol, from scenes to report.
 
     Records flights over several scenes, measures the setup asked for and those that the report
-    compares it with, and writes results.parquet, summary.json and report.html. With --preset
-    paper it repeats the paper's experiments, with sensors of their time, and says which of its
-    figures come out (docs/reproduce_the_paper.md). Section protocol of the configuration says how
-    much is measured on each flight (docs/parameters.md).
+    compares it with, and writes results.parquet, summary.json and report.html. --preset paper
+    repeats the paper's experiments with sensors of their time (docs/reproduce_the_paper.md).
+    Section protocol says how much is measured on each flight (docs/parameters.md).
     """
 
     sections: ClassVar[tuple[str, ...]] = ("oracle", "reference", "protocol")

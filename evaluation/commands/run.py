@@ -118,8 +118,7 @@ class RerunOptions:
 class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption, OutOption, Verb):
     """Run the pipeline over a recording and measure it against the truth.
 
-    Leaves the map, trajectories, claims, measurements and the report. Your own recordings, and
-    those of simulate --sealed, need no truth.
+    Leaves the map, poses, claims and the report. Your own and sealed recordings need no truth.
     """
 
     sections: ClassVar[tuple[str, ...]] = ("oracle", "rerun")
