@@ -25,6 +25,7 @@ from evaluation.commands.options import (
 )
 
 if TYPE_CHECKING:
+    from airground.config import Config
     from airground.io.recording import Recording
     from airground.io.robot_recording import Pair
     from evaluation.judge.summary import Summary
@@ -97,6 +98,7 @@ class RerunOptions:
         name: str,
         recording: Pair,
         truth: Truth | None,
+        config: Config,
         level: RerunLevel,
     ) -> Iterator[list[Onlooker]]:
         """The onlookers that draw a run into a folder; none where it was not asked for."""
@@ -109,7 +111,11 @@ class RerunOptions:
         with ExitStack() as stack:
             viewer = stack.enter_context(_viewer()) if self.rerun_live else None
             calibrations = {robot: recording.of(robot).calibration for robot in Source}
-            view = RunView(folder / RUN_FILE, name, calibrations, truth, level, viewer)
+            stamps = [recording.of(robot).camera_stamps for robot in Source]
+            times_ns = int(min(s[0] for s in stamps)), int(max(s[-1] for s in stamps))
+            view = RunView(
+                folder / RUN_FILE, name, calibrations, truth, config, times_ns, level, viewer
+            )
             stack.callback(view.close)
             yield [view]
 
@@ -165,7 +171,7 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
             announce(f"runs {recorded(path, seconds)}", START_S + seconds * RUN_S_PER_S)
             close_up = CloseUp(recording, truth, setup) if self.draws else None
             name = recording.path.name
-            with self.watching(folder, name, recording, truth, level) as onlookers:
+            with self.watching(folder, name, recording, truth, setup.config, level) as onlookers:
                 if close_up is not None:
                     onlookers.append(close_up)
                 result = run_recording(recording, truth, setup, seed, drops, onlookers, apart=True)
@@ -192,7 +198,7 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
             pair = opened()
             seconds = max(pair.mav.duration_s, pair.ground.duration_s)
             announce(f"runs {recorded(name, seconds)}", START_S + seconds * RUN_S_PER_S)
-            with self.watching(folder, name, pair, None, level) as onlookers:
+            with self.watching(folder, name, pair, None, setup.config, level) as onlookers:
                 result = run_pair(pair, setup, seed, onlookers)
             summary = write_pair(folder, pair, setup, result)
             write_config(setup.config, folder / "config.toml")

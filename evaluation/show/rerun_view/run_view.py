@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
 import rerun.blueprint as rrb
+from rerun.encodings import TimeRange, TimeRangeBoundary
 
+from airground.config import Config
 from airground.core.cloud import Source
 from airground.core.messages import RobotCalibration
 from evaluation.run.onlooker import Onlooker, Seen
@@ -23,17 +26,26 @@ from evaluation.show.rerun_view.sensor_stream import (
     LevelName,
     SensorStream,
 )
-from evaluation.show.rerun_view.timeline import ERRORS, Curves, Messages
+from evaluation.show.rerun_view.timeline import DECISIONS, ERRORS, Curves, Messages
+from evaluation.show.rerun_view.verdicts import Verdicts
 from sim.recording.truth import Truth
 
 RUN_FILE = "run.rrd"
+STAGE_MS = 250.0
+"""Largest time that is shown at first: a stage's first call takes many times that."""
 EYE_M, TARGET_M = (-2.9, -3.4, 4.3), (1.3, 0.7, 0.2)
 """Eye and target of the view in `ground` [m]: from behind the robot's start, along its path."""
+LEFT_M, NEARER = 1.2, 0.75
+"""How far both are moved to the left [m], and the eye towards the target, so that the way ahead
+fills the panel."""
+Times = tuple[int, int]
+"""First and last stamp of a recording [ns]."""
 
 
 class RunView:
     """An onlooker that writes a run to an .rrd file, and to a viewer that listens at an address.
-    Without truth, errors and everything else under `/truth` are left out."""
+    Without truth, errors and everything else under `/truth` are left out. Thresholds are those of
+    `config`."""
 
     def __init__(
         self,
@@ -41,11 +53,13 @@ class RunView:
         name: str,
         calibrations: Mapping[Source, RobotCalibration],
         truth: Truth | None,
+        config: Config,
+        times_ns: Times,
         level: LevelName = "stages",
         viewer: str | None = None,
     ) -> None:
         chosen = LEVELS[level]
-        shown = layout(with_truth=truth is not None)
+        shown = layout(truth is not None, times_ns)
         self._stream = stream = SensorStream(path, name, shown, viewer)
         self._parts: list[Onlooker] = [
             Robots(stream, chosen),
@@ -54,6 +68,7 @@ class RunView:
             Maps(stream, chosen, calibrations[Source.GROUND].camera),
             Localization(stream, truth),
             Curves(stream, chosen, truth),
+            Verdicts(stream, config, truth),
             Messages(stream),
         ]
         if truth is not None:
@@ -67,17 +82,17 @@ class RunView:
         self._stream.close()
 
 
-def layout(with_truth: bool) -> rrb.Blueprint:
-    """The world on the left, the results of each stage on the right, curves below.
+def layout(with_truth: bool, times_ns: Times) -> rrb.Blueprint:
+    """The world on the left, the results of each stage on the right, curves below over all times.
     Without truth there is no panel for it."""
     return rrb.Blueprint(
         rrb.Vertical(
             rrb.Horizontal(
-                rrb.Vertical(_world(with_truth), _messages(), row_shares=[9, 2]),
+                rrb.Vertical(_world(with_truth), _messages(), row_shares=[5, 2]),
                 _stages(with_truth),
                 column_shares=[5, 4],
             ),
-            _curves(with_truth),
+            _curves(with_truth, times_ns),
             row_shares=[7, 2],
         ),
         rrb.BlueprintPanel(state="collapsed"),
@@ -104,10 +119,17 @@ def _world(with_truth: bool) -> rrb.Spatial3DView:
             f"- {ERRORS}/**",
         ],
         spatial_information=rrb.SpatialInformation(target_frame=GROUND),
-        eye_controls=rrb.EyeControls3D(position=EYE_M, look_target=TARGET_M, eye_up=(0, 0, 1)),
+        eye_controls=eye_from_behind(LEFT_M),
         line_grid=rrb.LineGrid3D(visible=False),
         overrides={SCENE: rrb.EntityBehavior(visible=False)},
     )
+
+
+def eye_from_behind(left_m: float) -> rrb.EyeControls3D:
+    """The eye behind the robot's start, moved to its left by so much [m]."""
+    target = np.array(TARGET_M) + np.sqrt(0.5) * left_m * np.array([-1.0, 1.0, 0.0])
+    eye = target + NEARER * np.subtract(EYE_M, TARGET_M)
+    return rrb.EyeControls3D(position=eye, look_target=target, eye_up=(0, 0, 1))
 
 
 def _stages(with_truth: bool) -> rrb.Vertical:
@@ -142,26 +164,44 @@ def _picture(entity: str, name: str, contents: str = "$origin") -> rrb.Spatial2D
 
 def _messages() -> rrb.TextLogView:
     columns = rrb.TextLogColumns(timeline_columns=[TIMELINE], text_log_columns=["LogLevel", "Body"])
-    return rrb.TextLogView(origin="/events", name="events", columns=columns)
+    return rrb.TextLogView(
+        origin="/events",
+        name="decisions: losses, refusals, claims",
+        columns=columns,
+        rows=rrb.TextLogRows(filter_by_log_level=[str(level) for level in DECISIONS]),
+    )
 
 
-def _curves(with_truth: bool) -> rrb.Horizontal:
+def _curves(with_truth: bool, times_ns: Times) -> rrb.Horizontal:
+    def plot(entity: str, name: str, largest: float | None = None) -> rrb.TimeSeriesView:
+        return rrb.TimeSeriesView(
+            origin=entity,
+            name=name,
+            plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop),
+            axis_x=all_times(times_ns),
+            axis_y=None if largest is None else rrb.ScalarAxis(range=(0.0, largest)),
+        )
+
     errors = [
-        _plot(f"{ERRORS}/translation_m", "position error [m]"),
-        _plot(f"{ERRORS}/rotation_deg", "angular error [deg]"),
+        plot(f"{ERRORS}/translation_m", "position error [m]"),
+        plot(f"{ERRORS}/rotation_deg", "angular error [deg]"),
     ]
     return rrb.Horizontal(
         *(errors if with_truth else []),
-        _plot("/curves/spread_m", "spread [m]"),
         rrb.Tabs(
-            _plot("/curves/corners", "corners in the map"),
-            _plot("/curves/sigma_mm", "sigma of the position [mm]"),
+            plot("/curves/spread_m", "spread [m]"),
+            plot("/curves/inliers", "inliers"),
         ),
-        _plot("/curves/stage_ms", "stage times [ms]"),
+        rrb.Tabs(
+            plot("/curves/corners", "corners in the map"),
+            plot("/curves/sigma_mm", "sigma of the position [mm]"),
+        ),
+        plot("/curves/stage_ms", "stage times [ms]", STAGE_MS),
         column_shares=[*([4, 4] if with_truth else []), 3, 4, 5],
     )
 
 
-def _plot(entity: str, name: str) -> rrb.TimeSeriesView:
-    legend = rrb.PlotLegend(corner=rrb.Corner2D.LeftTop)
-    return rrb.TimeSeriesView(origin=entity, name=name, plot_legend=legend)
+def all_times(times_ns: Times) -> rrb.TimeAxis:
+    """One range for all plots, so that the cursor stands at the same place in each."""
+    first, last = (TimeRangeBoundary.absolute(seconds=time_ns / 1e9) for time_ns in times_ns)
+    return rrb.TimeAxis(view_range=TimeRange(start=first, end=last))

@@ -117,6 +117,8 @@ class Curves:
 
 
 GOOD, NOTE, BAD = rr.TextLogLevel.INFO, rr.TextLogLevel.DEBUG, rr.TextLogLevel.WARN
+DECISIONS = (GOOD, BAD, rr.TextLogLevel.ERROR)
+"""Levels that the list shows; corrected maps and added points are notes."""
 Message = tuple[str, rr.TextLogLevel]
 NAMES = {Source.MAV: "MAV", Source.GROUND: "ground robot"}
 

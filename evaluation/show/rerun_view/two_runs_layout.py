@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
 import rerun.blueprint as rrb
 
 from evaluation.judge.divergence import Held
 from evaluation.show.rerun_view.differences import conclusion
 from evaluation.show.rerun_view.images import ERROR_LIMIT_M
 from evaluation.show.rerun_view.localization import TRUE_POSITION
-from evaluation.show.rerun_view.run_view import EYE_M, TARGET_M
+from evaluation.show.rerun_view.run_view import eye_from_behind
 from evaluation.show.rerun_view.sensor_stream import COSTS, GROUND, TIMELINE, TRUTH
 from evaluation.show.rerun_view.timeline import ERRORS
 from evaluation.show.rerun_view.trace import RunFile
@@ -24,8 +23,8 @@ DIFFERENCES, MARKERS = "/differences", "/differences/curves"
 FROM_DIFFERENCE = "from_first_difference"
 """A timeline with the stamps of `sensor_time` that begins at the earliest difference: a layout
 cannot place the time cursor, but a viewer starts where its timeline begins."""
-NEARER, LEFT_M = 0.75, 0.35
-"""Of a run's view: the share of the eye's distance, and how far both move aside [m]."""
+LEFT_M = 0.5
+"""How far the eye moves to the left [m]: the panel is narrower than that of one run."""
 
 
 def two_runs_layout(first: RunFile, second: RunFile, earliest: Held | None) -> rrb.Blueprint:
@@ -62,15 +61,12 @@ def _world(first: RunFile, second: RunFile) -> rrb.Spatial3DView:
     hidden = [f"- {root}/mav/depth_map" for root in ("", SECOND)]
     true = [f"+ {TRUTH}/**", f"- {TRUTH}/depth_error", f"- {TRUE_POSITION}", f"- {ERRORS}/**"]
     names = f"{first.name} blue, {second.name} orange"
-    aside = np.array([-LEFT_M, LEFT_M, 0.0])
-    target = np.array(TARGET_M) + aside
-    eye = target + NEARER * np.subtract(EYE_M, TARGET_M)
     return rrb.Spatial3DView(
         origin="/",
         name=f"world: {names}" + (", truth pink" if first.has_truth else ""),
         contents=[*shown, *hidden, *true],
         spatial_information=rrb.SpatialInformation(target_frame=GROUND),
-        eye_controls=rrb.EyeControls3D(position=eye, look_target=target, eye_up=(0, 0, 1)),
+        eye_controls=eye_from_behind(LEFT_M),
         line_grid=rrb.LineGrid3D(visible=False),
         overrides={
             entity: rrb.EntityBehavior(visible=False)

@@ -11,6 +11,7 @@ import open3d as o3d
 import pyarrow as pa
 from rerun.chunk import RrdReader
 
+from airground.config import Config
 from airground.core.belief import Alignment, Belief, CostMap, HeightMap
 from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud, Source
@@ -102,6 +103,8 @@ class KnownTruth:
 
 
 TRUTH = cast(Truth, KnownTruth())
+CONFIG = Config()
+TIMES_NS = SECOND // 2, 4 * SECOND
 NAME, LENSES = "scripted", dict.fromkeys(Source, LENS)
 
 
@@ -178,7 +181,7 @@ def written(
     events: list[Seen] | None = None,
 ) -> Path:
     """The .rrd file of the scripted run."""
-    view = RunView(path, NAME, LENSES, truth, level)
+    view = RunView(path, NAME, LENSES, truth, CONFIG, TIMES_NS, level)
     show(view, seen_events() if events is None else events)
     view.close()
     return path

@@ -16,11 +16,20 @@ from rerun.experimental import ViewerClient
 from airground.errors import AirgroundError
 from evaluation.show.rerun_view import viewer
 from evaluation.show.rerun_view.run_view import RunView
-from tests.evaluation.show.scripted_run import LENSES, NAME, TRUTH, seen_events, show, written
+from tests.evaluation.show.scripted_run import (
+    CONFIG,
+    LENSES,
+    NAME,
+    TIMES_NS,
+    TRUTH,
+    seen_events,
+    show,
+    written,
+)
 
 WIDTH, HEIGHT = 1280, 800
 Answer = TypeVar("Answer")
-PANELS = 15
+PANELS = 16
 PATIENCE_S = 120.0
 HARMLESS = ("rasterizer",)
 """Warnings of a machine that draws without a graphics card."""
@@ -94,7 +103,9 @@ def test_the_viewer_draws_every_panel(tmp_path: Path) -> None:
 def test_a_run_is_seen_while_it_happens(tmp_path: Path) -> None:
     ports = viewer.free_ports()
     with headless(ports) as opened:
-        view = RunView(tmp_path / "run.rrd", NAME, LENSES, TRUTH, "all", ports.sink)
+        view = RunView(
+            tmp_path / "run.rrd", NAME, LENSES, TRUTH, CONFIG, TIMES_NS, "all", ports.sink
+        )
         show(view, seen_events())
         view.close()
         wait_for_the_run(opened)

@@ -29,6 +29,7 @@ from tests.evaluation.show.scripted_run import (
     SECOND,
     T_BELIEVED,
     T_GROUND_MAV,
+    TIMES_NS,
     ReadBack,
     seen_events,
     written,
@@ -84,7 +85,7 @@ def test_there_is_one_timeline_and_it_is_sensor_time(read: ReadBack) -> None:
 
 
 def test_without_truth_there_is_no_panel_for_it() -> None:
-    every, rest = set(origins(layout(with_truth=True))), set(origins(layout(with_truth=False)))
+    every, rest = set(origins(layout(True, TIMES_NS))), set(origins(layout(False, TIMES_NS)))
     assert rest == {origin for origin in every if not origin.startswith("/truth")}
     assert "/truth/depth_error" in every
 

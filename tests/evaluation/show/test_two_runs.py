@@ -31,11 +31,13 @@ from tests.evaluation.judge.flights import make_results
 from tests.evaluation.show.scripted_run import (
     BELIEF,
     CLOUD,
+    CONFIG,
     DOWN,
     LENSES,
     SECOND,
     T_BELIEVED,
     T_GROUND_MAV,
+    TIMES_NS,
     TRUTH,
     ReadBack,
     seen_events,
@@ -273,7 +275,7 @@ def test_runs_that_cannot_be_compared_are_refused(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     base, again = folders["base"], folders["again"]
-    view = RunView(tmp_path / "elsewhere.rrd", "another", LENSES, TRUTH)
+    view = RunView(tmp_path / "elsewhere.rrd", "another", LENSES, TRUTH, CONFIG, TIMES_NS)
     show(view, seen_events())
     view.close()
     with rr.RecordingStream("other", recording_id="scripted") as stream:

@@ -20,8 +20,10 @@ from evaluation.setup import console
 from evaluation.show.rerun_view import viewer
 from evaluation.show.rerun_view.run_view import RunView
 from tests.evaluation.show.scripted_run import (
+    CONFIG,
     LENSES,
     NAME,
+    TIMES_NS,
     TRUTH,
     ReadBack,
     seen_events,
@@ -137,7 +139,7 @@ def test_without_a_screen_a_window_is_refused(run: Path, monkeypatch: pytest.Mon
 def test_a_viewer_that_is_closed_meanwhile_leaves_the_file_whole(tmp_path: Path) -> None:
     ports, file = viewer.free_ports(), tmp_path / "run.rrd"
     with viewer.serving(ports) as server:
-        view = RunView(file, NAME, LENSES, TRUTH, "all", ports.sink)
+        view = RunView(file, NAME, LENSES, TRUTH, CONFIG, TIMES_NS, "all", ports.sink)
         show(view, seen_events()[:8])
         server.kill()
         server.wait()
