@@ -28,6 +28,7 @@ from evaluation.show.rerun_view.trace import RunFile, read_traces
 from evaluation.show.rerun_view.two_runs import FIRST_COLOUR, SECOND_COLOUR, SHARED_TRUTH
 from evaluation.show.rerun_view.two_runs_layout import FROM_DIFFERENCE
 from tests.evaluation.judge.flights import make_results
+from tests.evaluation.show.made_runs import INFO
 from tests.evaluation.show.scripted_run import (
     BELIEF,
     CLOUD,
@@ -318,7 +319,9 @@ def test_check_says_since_when_it_is_worse(
         runs.append(tmp_path / name)
         runs[-1].mkdir()
         shutil.copy(folders[name] / "run.rrd", runs[-1])
-        make_results(range(10), factors).write(runs[-1] / "results.parquet")
+        table = make_results(range(10), factors)
+        table.write(runs[-1] / "results.parquet")
+        build_summary(table, table.conditions()[0], INFO).write(runs[-1] / "summary.json")
     code = cli.parse("check", [str(runs[1]), "--against", str(runs[0])]).main()
     assert code == console.EXIT_WORSE
     said = " ".join(capsys.readouterr().out.split())
