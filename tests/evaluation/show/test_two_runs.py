@@ -20,6 +20,7 @@ from airground.errors import InputError
 from airground.io.tum import write_tum
 from airground.tracking import TrackedFrame
 from evaluation import cli
+from evaluation.judge.summary import build_summary
 from evaluation.run.onlooker import Seen
 from evaluation.setup import console
 from evaluation.show.rerun_view import viewer
