@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from airground.core.events import Aligned, BeliefUpdated
+from airground.core.events import Aligned
 from airground.core.se3 import SE3
 from evaluation.run.onlooker import Seen
 from evaluation.run.tracking import live_path
@@ -20,19 +20,16 @@ LONGEST_GAP_NS = 100_000_000
 
 class ClaimLog:
     """An onlooker that notes from when on which relation between the maps was claimed: that of the
-    newest accepted alignment, and before the first one that of the newest converged belief."""
+    newest accepted alignment. Where the heading is searched, a belief alone claims a place, but no
+    pose: its heading may be off by several degrees."""
 
     def __init__(self) -> None:
         self._claimed: list[tuple[int, SE3]] = []
-        self._is_aligned = False
 
     def see(self, seen: Seen) -> None:
         """Note one event."""
         match seen.event:
-            case BeliefUpdated(belief=belief) if belief.converged and not self._is_aligned:
-                self._claimed.append((seen.frame.stamp_ns, belief.T_ground_mav))
             case Aligned(alignment=alignment) if alignment.accepted:
-                self._is_aligned = True
                 self._claimed.append((seen.frame.stamp_ns, alignment.T_ground_mav))
 
     def claims(self, tracked: Mapping[str, Tracked]) -> list[tuple[int, SE3]]:

@@ -21,6 +21,8 @@ from evaluation.datasets.plan import Plan
 from evaluation.judge.accepted import Accepted, Measured
 from evaluation.judge.results import CONFIG, SHOWCASE, SUMMARY, TABLE, merged, read_results
 from evaluation.judge.runs import against, read_runs
+from evaluation.judge.score.benchmark import Benchmark, read_benchmark
+from evaluation.judge.score.submission import read_submission
 from evaluation.judge.summary import RunInfo, build_summary
 from evaluation.judge.verdict import compare
 from evaluation.measure.plans.dials import Subject as DialSubject
@@ -29,8 +31,10 @@ from evaluation.measure.plans.sweep import parse_vary, points
 from evaluation.measure.work.batch_system import read_jobs
 from evaluation.run.given_map import read_map
 from evaluation.setup.checked_json import read_checked
+from evaluation.setup.level_mark import LevelMark
 from evaluation.setup.settings import EVALUATOR_SECTIONS, resolve, resolve_all, write_config
 from evaluation.show.comparison.verdict_table import junit, markdown
+from evaluation.table.answer_file import write_answers
 from sim.robots.motion import simulate_motion
 from sim.scene import load_scene
 from sim.sensors.presets import sensor_preset
@@ -200,6 +204,28 @@ def read_clouds(folder: Path, out: Path) -> None:
     read_checked(Plan, folder / "dataset.json", "plan of a dataset")
 
 
+def make_submission(folder: Path) -> None:
+    """Answers of two runs to a benchmark, and what it was made from."""
+    lines = [f"{n / 30:.9f} {n / 100} 0 0 0 0 0 1 {n % 2}" for n in range(1, 60)]
+    for name in ("run1/0001.tum", "run2/0001.txt"):
+        (folder / "submission" / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / "submission" / name).write_text("\n".join(["# answers", *lines]) + "\n")
+    commas = "\n".join(line.replace(" ", ",") for line in lines) + "\n"
+    (folder / "submission" / "run2" / "0002.csv").write_text(commas)
+    (folder / "submission" / "submission.toml").write_text('name = "Ours"\nby = "a group"\n')
+    (folder / "truth").mkdir()
+    level = LevelMark(name="hard", version=1)
+    Benchmark(schema=1, level=level, seed=1, recordings=("0001", "0002")).write(folder / "truth")
+
+
+def read_scored(folder: Path, out: Path) -> None:
+    """As `score` reads them."""
+    read_benchmark(folder / "truth")
+    for run in read_submission(folder / "submission", {"0001", "0002"}).runs:
+        for name, answers in run.items():
+            write_answers(out / f"{name}.tum", answers.claims())
+
+
 SUBJECTS: dict[str, Subject] = {
     "recording with truth": Subject(make_recording, read_recording, work_on_recording, 3),
     "EuRoC folder": Subject(make_euroc, read_euroc, work_on_euroc, 2),
@@ -211,6 +237,7 @@ SUBJECTS: dict[str, Subject] = {
     "settings": Subject(make_settings, read_settings, read_settings, 2),
     "results": Subject(make_run, read_run, work_on_run, 2),
     "clouds, poses, plans": Subject(make_clouds, read_clouds, read_clouds, 2),
+    "submissions": Subject(make_submission, read_scored, read_scored),
 }
 
 
