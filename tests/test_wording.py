@@ -10,7 +10,7 @@ from tests.sources import ROOT
 WORDS = re.compile(
     r"(?<![a-z])(nobody|somebody|everybody|told|lived|wanting)(?![a-z])", re.IGNORECASE
 )
-HISTORY = {"CHANGELOG.md", "docs/notebook.md"}
+HISTORY = {"CHANGELOG.md", "docs/diary.md"}
 NAMING_THE_WORDS = {"tests/test_wording.py", "tests/test_docs.py"}
 KINDS = (".py", ".md", ".toml", ".j2", ".css", ".js", ".yml", ".yaml", ".txt", ".cff")
 

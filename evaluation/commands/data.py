@@ -18,6 +18,7 @@ from evaluation.commands.options import (
     Shown,
     Verb,
     in_range,
+    on_disk,
     work_s,
 )
 from evaluation.setup.console import EXIT_FAULT_FOUND, EXIT_OK
@@ -103,7 +104,7 @@ class Simulate(BenchmarkOptions, DatasetOptions, SensorOption, SeedOption, OutOp
         check_free(self.out)
         seconds = self.duration_s or scene.duration_s
         expected_s = work_s(seconds * RENDER_S_PER_S, self.workers())
-        announce(f"records {seconds:.0f} s over {scene.name}", expected_s)
+        announce(f"records {seconds:.0f} s over {scene.name}, {on_disk(seconds)}", expected_s)
         if self.sealed is not None:
             asked_for = Flight(scene, seed, flight, subject.sensors, self.duration_s, dials)
             record_sealed(asked_for, self.out, self.sealed, self.workers())
@@ -138,7 +139,8 @@ class Simulate(BenchmarkOptions, DatasetOptions, SensorOption, SeedOption, OutOp
         scenes = {scene: load_scene(scene) for scene in self.scenes}
         seconds = sum(self.duration_s or scenes[world.scene].duration_s for world in plan.worlds)
         expected_s = work_s(seconds * RENDER_S_PER_S, self.workers())
-        announce(f"records {len(plan.worlds)} worlds, {seconds:.0f} s in all", expected_s)
+        what = f"records {len(plan.worlds)} worlds, {seconds:.0f} s in all, {on_disk(seconds)}"
+        announce(what, expected_s)
         make_dataset(plan, self.out, jobs, self.workers())
 
     def _make_benchmark(self, name: str) -> None:
@@ -155,7 +157,8 @@ class Simulate(BenchmarkOptions, DatasetOptions, SensorOption, SeedOption, OutOp
         planned = [first for first, *_ in draw.tries()]
         seconds = sum(flight.scene.duration_s for flight in planned)
         expected_s = work_s(seconds * RENDER_S_PER_S, self.workers())
-        announce(f"records {len(planned)} flights, {seconds:.0f} s in all", expected_s)
+        what = f"records {len(planned)} flights, {seconds:.0f} s in all, {on_disk(seconds)}"
+        announce(what, expected_s)
         make_benchmark(draw, self.out, self.sealed, self.workers())
 
 

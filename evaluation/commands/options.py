@@ -31,8 +31,16 @@ TRACK_S_PER_S = 0.5
 """One front end over one robot's images: 15 ms per image at 30 Hz."""
 RENDER_S_PER_S = 3.0
 """Images of both robots: 2 to 7 by the scene."""
+RECORDED_MB_PER_S = 26.0
+"""Images of both robots on the disk, without loss: noise of the sensors cannot be compressed."""
 MEASURE_S_PER_S = 3.0
 """The paper's protocol with one kind of maps: 2 without baselines, 4 with all of them."""
+
+
+def on_disk(seconds: float) -> str:
+    """Size of a recording of so many seconds, in words."""
+    megabytes = RECORDED_MB_PER_S * seconds
+    return f"about {megabytes / 1000:.1f} GB" if megabytes >= 1000 else f"about {megabytes:.0f} MB"
 
 
 def work_s(core_s: float, cores: int) -> float:
