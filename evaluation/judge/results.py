@@ -18,6 +18,14 @@ TABLE, SUMMARY, CONFIG, SHOWCASE = "results.parquet", "summary.json", "config.to
 
 
 @dataclass(frozen=True)
+class AtLevel:
+    """What was measured at one level of difficulty."""
+
+    level: LevelMark
+    table: ResultTable
+
+
+@dataclass(frozen=True)
 class Results:
     """All measurements, and their parameters.
 
@@ -27,7 +35,8 @@ class Results:
         seed: Seed of everything random.
         showcase: Data of the pictures; None without pictures.
         notes: Sentences for the end of the report.
-        level: The level of difficulty; None where none was asked for.
+        level: The level of difficulty; None where none was asked for, and for several.
+        levels: What was measured at each of several levels, in order of appearance.
     """
 
     table: ResultTable
@@ -36,6 +45,7 @@ class Results:
     showcase: Showcase | None = None
     notes: Sequence[str] = ()
     level: LevelMark | None = None
+    levels: Sequence[AtLevel] = ()
 
 
 def read_results(folder: Path) -> Results:
@@ -86,4 +96,13 @@ def merged(parts: Sequence[Results]) -> Results:
         showcase=showcases[0] if showcases else None,
         notes=[f"Put together from {len(parts)} runs."] if len(parts) > 1 else [],
         level=first.level if all(part.level == first.level for part in parts) else None,
+        levels=_by_level(parts),
     )
+
+
+def _by_level(parts: Sequence[Results]) -> list[AtLevel]:
+    tables: dict[LevelMark, list[ResultTable]] = {}
+    for part in parts:
+        if part.level is not None:
+            tables.setdefault(part.level, []).append(part.table)
+    return [AtLevel(level, ResultTable.concat(found)) for level, found in tables.items()]

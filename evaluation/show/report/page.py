@@ -11,7 +11,7 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 from PIL import Image
 
-from evaluation.judge.results import CONFIG, SHOWCASE, SUMMARY, TABLE, Results
+from evaluation.judge.results import CONFIG, SHOWCASE, SUMMARY, TABLE, AtLevel, Results
 from evaluation.judge.summary import Summary, build_summary
 from evaluation.measure.showcase import Showcase
 from evaluation.setup import published
@@ -25,6 +25,7 @@ from evaluation.show.report.error_budget import budget_table
 from evaluation.show.report.failures import control_table, failures
 from evaluation.show.report.figures import report_figures
 from evaluation.show.report.files import beside, write_behind, write_latex
+from evaluation.show.report.levels import level_figures, level_table
 from evaluation.show.report.reproduction import reproduction_table
 from evaluation.show.report.screen import live_table
 from evaluation.show.report.seen import is_chart, seen
@@ -42,7 +43,9 @@ def write_results(results: Results, folder: Path) -> Summary:
     write_config(results.config, folder / CONFIG)
     if results.showcase is not None:
         results.showcase.save(folder / SHOWCASE)
-    write_report(folder, results.table, results.showcase, run, results.notes, results.level)
+    write_report(
+        folder, results.table, results.showcase, run, results.notes, results.level, results.levels
+    )
     summary.write(folder / SUMMARY)
     return summary
 
@@ -54,6 +57,7 @@ def write_report(
     run: RunInfo,
     notes: Sequence[str] = (),
     level: LevelMark | None = None,
+    levels: Sequence[AtLevel] = (),
 ) -> None:
     """Write `report.html`, `figures/` (PNG, PDF, CSV) and `tables/` (LaTeX) into `out`.
 
@@ -67,12 +71,14 @@ def write_report(
         run: Where the results come from.
         notes: Sentences that the page lists at its end.
         level: The level of difficulty that the page names; None without.
+        levels: What was measured at each of several levels.
     """
     shown = table.conditions()
     primary = table.of(shown[0])
     measured = primary.scored()
     tables = {
         "reproduction": reproduction_table(table, shown),
+        "by_level": level_table(levels),
         "comparison": comparison_table(table, shown),
         "trajectories": trajectory_table(table, shown),
         "budget": budget_table(measured),
@@ -93,6 +99,7 @@ def write_report(
         headlines=headlines(measured),
         shared=shared_parts(shown) if len(shown) > 1 else shown[0].label(),
         pictures=[saved_picture(f, out, table) for f in report_figures(table, shown, showcase)],
+        level_pictures=[saved_picture(drawn, out) for drawn in level_figures(levels)],
         files=write_latex(out, tables),
         beside=beside(out),
         failures=failures(measured),
