@@ -12,7 +12,7 @@ from sim.recording.robot_view import RobotView
 from sim.recording.view_tiles import Tile, tiles_of
 from sim.sensors.depth import kinect_depth
 from sim.sensors.pixel_rays import PixelRays
-from sim.sensors.presets import DepthNoise
+from sim.sensors.sensor_errors import DepthNoise
 
 VIEW = "ground_depth"
 """Name of the depth camera's views in a drawn world."""

@@ -17,7 +17,7 @@ from sim.sensors.auto_exposure import WHITE, Exposure
 from sim.sensors.hashed_noise import gaussian, noise_key
 from sim.sensors.pixel_motion import pixel_motion
 from sim.sensors.pixel_rays import PixelRays
-from sim.sensors.presets import ImageNoise
+from sim.sensors.sensor_errors import ImageNoise
 
 MAX_SAMPLES = 32
 _PERIODS_S = (2.5, 20.0)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from sim.sensors.hashed_noise import gaussian, noise_key
 from sim.sensors.pixel_rays import PixelRays
-from sim.sensors.presets import DepthNoise
+from sim.sensors.sensor_errors import DepthNoise
 
 BASELINE_M = 0.075
 INFRARED_FOCAL_PX = 585.0

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.messages import ImuSamples, MagneticSamples
-from sim.sensors.presets import ImuNoise, MagneticNoise
+from sim.sensors.sensor_errors import ImuNoise, MagneticNoise
 
 
 def measure_imu(ideal: ImuSamples, noise: ImuNoise | None, rng: np.random.Generator) -> ImuSamples:

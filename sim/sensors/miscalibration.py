@@ -21,7 +21,8 @@ from airground.io.calibration import (
 from sim.robots.robot_motion import Mounting
 from sim.sensors.depth import INFRARED_FOCAL_PX
 from sim.sensors.optics import EUROC_RADTAN, KINECT_RADTAN, misjudged
-from sim.sensors.presets import ADIS16448, NOMINAL, CalibrationErrors, ImuNoise, SensorPreset
+from sim.sensors.presets import ADIS16448, NOMINAL, SensorPreset
+from sim.sensors.sensor_errors import CalibrationErrors, ImuNoise
 
 CAMERA_RATE_HZ = 30.0
 IMU_RATE_HZ = 200.0

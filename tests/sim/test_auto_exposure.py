@@ -14,7 +14,8 @@ from sim.sensors.auto_exposure import (
     ExposureCourse,
     regulate,
 )
-from sim.sensors.presets import NOMINAL, NONE, REAL, with_auto_exposure, with_gamma
+from sim.sensors.presets import NOMINAL, NONE, REAL
+from sim.sensors.turned import with_auto_exposure, with_gamma
 
 RATE_HZ = 30.0
 FIXED_S = 0.005

@@ -22,7 +22,8 @@ from sim.recording import recorder
 from sim.recording.recorder import record
 from sim.recording.truth import Truth
 from sim.scene import parse_scene
-from sim.sensors.presets import NOMINAL, NONE, REAL, SensorPreset, with_depth_camera
+from sim.sensors.presets import NOMINAL, NONE, REAL, SensorPreset
+from sim.sensors.turned import with_depth_camera
 from tests.sim.small_flight import SCENE, few_stamps, unpainted
 
 BASELINE_M = 0.05

@@ -14,7 +14,8 @@ from sim.robots.motion import simulate_motion
 from sim.robots.overlap import driven_path, overlap_along_flight
 from sim.scene import Scene, load_scene
 from sim.sensors.imu import measure_field
-from sim.sensors.presets import HARSH, NOMINAL, NONE, SensorPreset, with_heading_error, with_noise
+from sim.sensors.presets import HARSH, NOMINAL, NONE, SensorPreset
+from sim.sensors.turned import with_heading_error, with_noise
 from sim.world.magnetic_field import EARTH_FIELD_WORLD
 from sim.world.world import World, build_world
 

@@ -25,7 +25,8 @@ from sim.sensors.faults import (
     placed,
 )
 from sim.sensors.faulty_frames import FaultyFrames
-from sim.sensors.presets import NOMINAL, with_dropped, with_imu_gap
+from sim.sensors.presets import NOMINAL
+from sim.sensors.turned import with_dropped, with_imu_gap
 from sim.world.world import build_world
 from tests.sim.small_flight import SCENE, few_stamps, unpainted
 

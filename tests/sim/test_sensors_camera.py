@@ -12,7 +12,8 @@ from sim.sensors.camera import MAX_SAMPLES, ExposureDrift, ImageSensor
 from sim.sensors.hashed_noise import gaussian, noise_key
 from sim.sensors.pixel_motion import pixel_motion
 from sim.sensors.pixel_rays import PixelRays
-from sim.sensors.presets import HARSH, NOMINAL, ImageNoise
+from sim.sensors.presets import HARSH, NOMINAL
+from sim.sensors.sensor_errors import ImageNoise
 
 CAMERA = PinholeCamera(80, 60, 70.0, 72.0, 39.0, 30.5)
 RAYS = PixelRays(CAMERA)

@@ -15,7 +15,8 @@ from sim.sensors.depth import (
 )
 from sim.sensors.hashed_noise import gaussian, noise_key
 from sim.sensors.pixel_rays import PixelRays
-from sim.sensors.presets import HARSH, NOMINAL, DepthNoise
+from sim.sensors.presets import HARSH, NOMINAL
+from sim.sensors.sensor_errors import DepthNoise
 
 CAMERA = PinholeCamera(320, 240, 262.5, 262.5, 159.5, 119.5)
 RAYS = PixelRays(CAMERA)

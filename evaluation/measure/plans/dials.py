@@ -11,8 +11,8 @@ from airground.errors import InputError
 from evaluation.setup.settings import with_value
 from sim.appearance.other_light import later_light, light_between
 from sim.scene import MAX_HEAP_HEIGHT_M, Light, Scene
-from sim.sensors.presets import (
-    SensorPreset,
+from sim.sensors.presets import SensorPreset
+from sim.sensors.turned import (
     with_auto_exposure,
     with_depth_camera,
     with_distortion,

@@ -19,7 +19,8 @@ from evaluation.measure.work.unit import Unit, grouped, key_of
 from evaluation.setup.setups import PoseNoise, Setup, with_localization
 from sim.recording.recorder import Flight
 from sim.scene import load_scene
-from sim.sensors.presets import HARSH, NOMINAL, with_heading_error, with_noise
+from sim.sensors.presets import HARSH, NOMINAL
+from sim.sensors.turned import with_heading_error, with_noise
 
 TINY = load_scene("tiny")
 FLIGHT = Flight(TINY, 3, 0, NOMINAL)
