@@ -19,7 +19,7 @@ from evaluation.show.report.page import rendered, saved_picture
 
 PAGE, JSON, SCORE = "leaderboard.html", "leaderboard.json", "score.json"
 HEADER = (
-    "", "submission", "score", "right within 0.25 m", "area", "points", "wrong", "claims, wrong",
+    "", "submission", "score", "in 0.25 m", "area", "points", "wrong", "claims, wrong",
 )  # fmt: skip
 _AT_25_CM = 2
 """Index of 0.25 m among `DISTANCES_M`."""
@@ -62,6 +62,7 @@ def print_scores(board: Leaderboard) -> None:
         "score: 100 (area - wrong); seconds are judged (docs/score.md)",
         left=(0, 1),
         bold=(2,),
+        compact=True,
     )
 
 
