@@ -46,7 +46,7 @@ def scene_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def pairs(simulated: Simulated, scene_file: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Right images of all frames of both robots."""
     out = tmp_path_factory.mktemp("stereo")
-    words = ["render", str(simulated.recording.path), "--add", "stereo", "--threads", "1"]
+    words = ["render", str(simulated.recording.path), "--add", "stereo"]
     options = ["--baseline", str(BASELINE_M), "--scene", str(scene_file), "--out", str(out)]
     assert answer([*words, *options]) in (None, 0)
     return out
