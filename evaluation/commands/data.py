@@ -239,21 +239,29 @@ class Inspect(FolderOptions, Verb):
 
     For recordings and datasets of simulate, folders of EuRoC, TUM RGB-D and 7-Scenes, and ROS bags:
     digests, rates, gaps, calibration, what was assumed, and whether the true poses fit the images.
-    Exits with 3 if something is wrong.
+    Of a folder of recordings, each. Exits with 3 if something is wrong.
     """
 
     dataset: Annotated[Positional[Path], Shown("DATASET")]
     """folder of the dataset, or a bag"""
     json: bool = False
     """print JSON in place of a table"""
+    page: Annotated[Path | None, Shown("FILE.html")] = None
+    """draw a page of it: images, paths from above, motion, overlap and light"""
 
     def main(self) -> int:
+        from evaluation.datasets.gallery.page import dataset_page
         from evaluation.datasets.inspection.findings import Verdict, as_json, show
         from evaluation.datasets.inspection.inspect_dataset import inspect_dataset
+        from evaluation.setup.output import check_new_file, write_whole
         from evaluation.setup.progress import step
 
+        if self.page is not None:
+            check_new_file(self.page, "--page")
         with step("inspecting"):
             layout, findings = inspect_dataset(self.dataset, self.open)
+        if self.page is not None:
+            write_whole(self.page, dataset_page(self.dataset, self.open, findings))
         if self.json:
             print(as_json(str(self.dataset), layout, findings))
         else:

@@ -38,13 +38,14 @@ class View(Verb):
     """write one .rrd file that any viewer of rerun opens"""
 
     def main(self) -> None:
+        from evaluation.setup.output import check_new_file
         from evaluation.show.rerun_view import viewer
 
         files = rerun_files(self.runs)
         for file in files:
             viewer.verify(file)
         if self.save is not None:
-            viewer.check_new(self.save)
+            check_new_file(self.save, "--save")
         elif not self.serve and not viewer.has_screen():
             raise InputError(
                 "no screen here: --serve shows it in a browser, --save FILE takes it elsewhere"

@@ -46,3 +46,29 @@ def check_free(path: Path) -> None:
     """
     if path.exists() or path.is_symlink():
         raise InputError(f"--out {path}: exists already; name a new folder, or remove this one")
+
+
+def check_new_file(path: Path, option: str) -> None:
+    """Refuse an output file that exists or has no folder, before any work is done.
+
+    Raises:
+        InputError: `path`, which the option names, cannot become a new file.
+    """
+    if path.exists() or path.is_symlink():
+        raise InputError(f"{option} {path}: exists already; name a new file, or remove this one")
+    if not path.parent.is_dir():
+        raise InputError(f"{option} {path}: there is no folder {path.parent}")
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a new file: whole, or not at all.
+
+    Raises:
+        OSError: Writing failed; the error names a file.
+    """
+    partial = path.with_name(f".{path.name}.partial")
+    try:
+        partial.write_text(text, encoding="utf-8")
+        partial.rename(path)
+    finally:
+        partial.unlink(missing_ok=True)

@@ -44,8 +44,8 @@ def inspect_dataset(path: Path, opener: Opener = open_robot) -> tuple[str, list[
     """Inspect a dataset; what keeps it from being read is a finding, too.
 
     Returns:
-        Its layout ("airground", "dataset" of many, "euroc", "tum", "7scenes" or "ros"), and the
-        findings.
+        Its layout ("airground", "dataset" of many of ours, "folder" of many of any layout, "euroc",
+        "tum", "7scenes" or "ros"), and the findings.
 
     Raises:
         InputError: The path has no known layout.
@@ -64,7 +64,28 @@ def inspect_dataset(path: Path, opener: Opener = open_robot) -> tuple[str, list[
             return layout, _robot(path, Source.GROUND, opener)
         case "ros":
             return layout, _bag(path, opener)
+    if found := recordings_in(path):
+        each = [(name, inspect_dataset(folder, opener)[1]) for name, folder in found.items()]
+        return "folder", [under(name, one) for name, findings in each for one in findings]
     raise unknown_layout(path, f", {PLAN} (a dataset of ours)")
+
+
+def recordings_in(path: Path) -> dict[str, Path]:
+    """Recordings of any layout by name: the path itself, or those in its folders, two deep."""
+    if layout_of(path) is not None:
+        return {path.resolve().name: path}
+    found: dict[str, Path] = {}
+    for pattern in ("*", "*/*"):
+        for one in sorted(path.glob(pattern)):
+            inside = any(one.is_relative_to(other) for other in found.values())
+            if not inside and not one.name.startswith(".") and layout_of(one) is not None:
+                found[str(one.relative_to(path))] = one
+    return found
+
+
+def under(name: str, finding: Finding) -> Finding:
+    """A finding of one recording among many."""
+    return replace(finding, part=f"{name} {finding.part}".strip())
 
 
 def _bag(path: Path, opener: Opener) -> list[Finding]:
@@ -87,7 +108,7 @@ def _many(path: Path) -> list[Finding]:
     for names, defect in ((planned - there, "is missing"), (there - planned, "was not planned")):
         findings += [Finding(n, "recording", defect, Verdict.WRONG) for n in sorted(names)]
     for name in sorted(there & planned):
-        findings += [replace(one, part=f"{name} {one.part}") for one in _ours(path / name)]
+        findings += [under(name, one) for one in _ours(path / name)]
     return findings
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import matplotlib as mpl
 import numpy as np
@@ -122,10 +122,15 @@ def reference_line(axes: Axes, y: float, text: str) -> None:
     )  # fmt: skip
 
 
-@styled
 def save_picture(figure: Figure, folder: Path, name: str) -> None:
     """Write `name`.png into an existing folder; the same figure gives the same bytes."""
-    figure.savefig(folder / f"{name}.png", dpi=PICTURE_DPI, metadata={"Software": None})
+    write_png(figure, folder / f"{name}.png")
+
+
+@styled
+def write_png(figure: Figure, file: Path | IO[bytes]) -> None:
+    """Write a figure as PNG; the same figure gives the same bytes."""
+    figure.savefig(file, format="png", dpi=PICTURE_DPI, metadata={"Software": None})
 
 
 @styled

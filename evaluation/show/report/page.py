@@ -18,7 +18,7 @@ from evaluation.setup import published
 from evaluation.setup.condition import RunInfo, shared_parts
 from evaluation.setup.level_mark import LevelMark
 from evaluation.setup.settings import write_config
-from evaluation.show.figures.style import ReportFigure, save_figure
+from evaluation.show.figures.style import ReportFigure, save_figure, write_png
 from evaluation.show.report.baselines import baseline_table
 from evaluation.show.report.calibration import calibration_table, claims_table
 from evaluation.show.report.error_budget import budget_table
@@ -143,15 +143,25 @@ def saved_picture(drawn: ReportFigure, out: Path, table: ResultTable | None = No
     """Save a figure into `figures/` of a folder, and pack it for the page; with the table, also the
     rows behind it."""
     save_figure(drawn.figure, out / "figures", drawn.name)
+    behind = write_behind(out, drawn.name, table) if table is not None else ""
     with Image.open(out / "figures" / f"{drawn.name}.png") as opened:
-        image = opened.convert("RGB")
+        files = (f"figures/{drawn.name}.pdf", *([behind] if behind else []))
+        return _embedded(drawn, opened, files)
+
+
+def shown_picture(drawn: ReportFigure) -> Picture:
+    """Pack a figure for a page that stands alone, without files beside it."""
+    png = io.BytesIO()
+    write_png(drawn.figure, png)
+    with Image.open(png) as opened:
+        return _embedded(drawn, opened, ())
+
+
+def _embedded(drawn: ReportFigure, opened: Image.Image, files: tuple[str, ...]) -> Picture:
+    image = opened.convert("RGB")
     if image.width > PICTURE_WIDTH_PX:
         height = round(image.height * PICTURE_WIDTH_PX / image.width)
         image = image.resize((PICTURE_WIDTH_PX, height), Image.Resampling.LANCZOS)
-    packed = io.BytesIO()
-    image.save(packed, "WEBP", quality=WEBP_QUALITY, method=4)
-    data_uri = "data:image/webp;base64," + base64.b64encode(packed.getvalue()).decode("ascii")
-    behind = write_behind(out, drawn.name, table) if table is not None else ""
     return Picture(
         name=drawn.name,
         title=drawn.title,
@@ -159,11 +169,18 @@ def saved_picture(drawn: ReportFigure, out: Path, table: ResultTable | None = No
         wide=drawn.wide,
         seen=seen(drawn.figure),
         chart=is_chart(drawn.figure),
-        files=(f"figures/{drawn.name}.pdf", *([behind] if behind else [])),
-        data_uri=data_uri,
+        files=files,
+        data_uri=webp_uri(image, WEBP_QUALITY),
         width=image.width,
         height=image.height,
     )
+
+
+def webp_uri(image: Image.Image, quality: int) -> str:
+    """An image as an address that holds it, compressed with loss."""
+    packed = io.BytesIO()
+    image.save(packed, "WEBP", quality=quality, method=4)
+    return "data:image/webp;base64," + base64.b64encode(packed.getvalue()).decode("ascii")
 
 
 def rendered(template: str, **words: object) -> str:

@@ -17,6 +17,7 @@ from urllib.parse import quote
 import rerun_cli
 
 from airground.errors import AirgroundError, InputError
+from evaluation.setup.output import check_new_file
 
 LOOPBACK = "127.0.0.1"
 START_S = 30.0
@@ -105,7 +106,7 @@ def save(file: Path, out: Path) -> None:
     Raises:
         InputError: `file` is no recording of rerun, or `out` exists or cannot be written.
     """
-    check_new(out)
+    check_new_file(out, "--save")
     partial = out.with_name(f".{out.name}.partial")
     try:
         _carry_out("rrd", "optimize", str(file), "-o", str(partial))
@@ -113,14 +114,6 @@ def save(file: Path, out: Path) -> None:
         partial.rename(out)
     finally:
         partial.unlink(missing_ok=True)
-
-
-def check_new(out: Path) -> None:
-    """Raise InputError where a file to save exists already, or has no folder."""
-    if out.exists():
-        raise InputError(f"--save {out}: exists already; name a new file, or remove this one")
-    if not out.parent.is_dir():
-        raise InputError(f"--save {out}: there is no folder {out.parent}")
 
 
 def verify(file: Path) -> None:
