@@ -17,7 +17,7 @@ from sim.recording.frames import FrameMaker
 from sim.recording.recorder import image_stamps, record
 from sim.recording.truth import Truth
 from sim.scene import parse_scene
-from sim.sensors.presets import NOMINAL, NONE, SensorPreset
+from sim.sensors.presets import NOMINAL, NONE, REAL, SensorPreset
 from sim.world.world import painted
 from tests.sim.small_flight import FRAMES, SCENE, few_stamps, unpainted
 
@@ -117,12 +117,15 @@ def test_depth_errs_by_scale_and_noise_only(nominal: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("preset", [NOMINAL, REAL], ids=lambda preset: preset.name)
 def test_the_same_seed_gives_the_same_bytes_whoever_renders(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, preset: SensorPreset
 ) -> None:
     monkeypatch.setattr(recorder, "painted", painted)
-    one, two = make(tmp_path / "one", workers=1), make(tmp_path / "two", workers=2)
-    assert contents(one) == contents(two)
+    one, two, four = (
+        contents(make(tmp_path / str(workers), preset, workers)) for workers in (1, 2, 4)
+    )
+    assert one == two == four
 
 
 def test_another_flight_is_over_the_same_heap(nominal: Path, tmp_path: Path) -> None:
