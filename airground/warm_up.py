@@ -7,6 +7,7 @@ import numpy as np
 from airground.config import Config, GroundMapping
 from airground.core.camera import PinholeCamera
 from airground.core.cloud import PointCloud
+from airground.core.compile_once import compiling_once
 from airground.core.messages import GroundImage
 from airground.core.se3 import SE3, rotation_angle
 from airground.core.surface import DepthMap
@@ -29,10 +30,11 @@ POINTS_PER_SIDE = 60
 
 def warm_up_mapping(config: Config, rng: np.random.Generator) -> None:
     """Compile everything above tracking; `slam.warm_up` does the same for tracking."""
-    warm_up_dense(config)
-    warm_up_ground_map()
-    warm_up_localization(config, rng)
-    warm_up_refinement(config)
+    with compiling_once("mapping"):
+        warm_up_dense(config)
+        warm_up_ground_map()
+        warm_up_localization(config, rng)
+        warm_up_refinement(config)
 
 
 def warm_up_dense(config: Config) -> None:

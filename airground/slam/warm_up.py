@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import cv2
 import numpy as np
 
 from airground.config import Config
 from airground.core.arrays import U8
 from airground.core.camera import PinholeCamera
+from airground.core.cloud import Source
+from airground.core.compile_once import compiling_once
 from airground.core.messages import GroundImage, ImuNoise, ImuSamples, MavImage, RobotCalibration
 from airground.core.se3 import SE3
 from airground.slam.inertial.preintegration import GRAVITY
@@ -25,20 +29,34 @@ DARK = range(70, 73)
 """Black images, so that finding the way back is compiled, too."""
 
 
-def warm_up_slam(rng: np.random.Generator) -> None:
-    """Track a camera that swings over a flat texture, as both robots would; the MAV begins once at
-    rest and once in motion."""
-    texture = _texture(rng)
+def warm_up_slam(rng: np.random.Generator, robots: Collection[Source] = tuple(Source)) -> None:
+    """Track a camera that swings over a flat texture, as each of these robots would; the MAV begins
+    once at rest and once in motion."""
+    with compiling_once("slam"):
+        if Source.MAV in robots:
+            _swing_mav(_texture(rng), rng)
+        if Source.GROUND in robots:
+            _swing_ground(_texture(rng), rng)
+
+
+def _calibration() -> RobotCalibration:
     noise = ImuNoise(1e-4, 1e-5, 1e-3, 1e-4)
-    calibration = RobotCalibration(CAMERA, DOWN, SE3.identity(), noise)
+    return RobotCalibration(CAMERA, DOWN, SE3.identity(), noise)
+
+
+def _swing_mav(texture: U8, rng: np.random.Generator) -> None:
     for first in (1, MOVING):
-        mav = MonocularSlam(calibration, Config(), rng)
+        mav = MonocularSlam(_calibration(), Config(), rng)
         for index in range(first, IMAGES):
             mav.add_imu(_samples(index * IMAGE_NS))
             mav.track(MavImage(index * IMAGE_NS, _image(texture, index)))
         mav.finish()
-    ground = RgbdSlam(calibration, Config(), rng)
+
+
+def _swing_ground(texture: U8, rng: np.random.Generator) -> None:
+    ground = RgbdSlam(_calibration(), Config(), rng)
     depth = np.full((CAMERA.height, CAMERA.width), HEIGHT_M, np.float32)
+    depth[:, : CAMERA.width // 3] = np.nan  # points without depth are triangulated
     for index in range(1, IMAGES):
         colour = np.repeat(_image(texture, index)[..., None], 3, axis=2)
         ground.add_imu(_samples(index * IMAGE_NS))

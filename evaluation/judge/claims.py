@@ -10,12 +10,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy.stats import chi2, spearmanr
 
 from evaluation.judge import samples
 from evaluation.measure.protocol.negatives import CASES
 from evaluation.setup.checked_json import Count, Number, Part, Share, number
-from evaluation.table.intervals import Rate, wilson
+from evaluation.table.intervals import Rate, chi2_quantile, wilson
 from evaluation.table.rows import CONTROL_SCENES, SEQUENCE_KEYS, ResultTable
 
 TO_BE_FOUND = "found"
@@ -124,7 +123,7 @@ class Localizations:
 
     def coverage(self, share: float) -> Rate:
         """How often the truth lies in the ellipse that holds this share of a Gaussian."""
-        inside = self.squared_mahalanobis <= chi2.ppf(share, FREEDOM)
+        inside = self.squared_mahalanobis <= chi2_quantile(share, FREEDOM)
         return wilson(int(inside.sum()), len(self))
 
     def mean_normalized_error(self) -> float:
@@ -135,13 +134,15 @@ class Localizations:
         """Median NEES over that of a Gaussian: above 1 is overconfident; NaN of none."""
         if len(self) == 0:
             return float("nan")
-        return float(np.median(self.squared_mahalanobis) / chi2.ppf(0.5, FREEDOM))
+        return float(np.median(self.squared_mahalanobis) / chi2_quantile(0.5, FREEDOM))
 
     def rank_correlation(self) -> float:
         """Spearman's, of spread and error: 1 where a larger spread always means a larger error.
         NaN for fewer than three localizations, or where one of both never changes."""
         if len(self) < 3 or np.ptp(self.error_m) == 0 or np.ptp(self.spread_m) == 0:
             return float("nan")
+        from scipy.stats import spearmanr  # a third of a second, often not needed
+
         return float(spearmanr(self.spread_m, self.error_m).statistic)
 
 

@@ -146,5 +146,5 @@ def open_tracker(
     calibration = recording.of(task.robot).calibration
     tracker = RobotTracker(task.robot, calibration, watched.of(task.robot))
     if task.robot.name.lower() in task.setup.slam_robots():
-        warm_up_slam(np.random.default_rng(0))
+        warm_up_slam(np.random.default_rng(0), (task.robot,))
     return recording, watched, tracker

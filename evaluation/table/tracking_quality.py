@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from airground.core.se3 import SE3
 from airground.slam.front_end import TrackedPose
+from evaluation.table.intervals import chi2_quantile
 from evaluation.table.row_writer import RowWriter
 from evaluation.table.tracked_share import first_motion_ns, tracked_share
 from evaluation.table.tracking_log import FrontEndLog, Tracked
@@ -144,5 +144,5 @@ def _normalized(errors: NDArray[np.float64], covariances: NDArray[np.float64]) -
     freedom = errors.shape[1]
     solved = np.linalg.solve(covariances, errors[:, :, None])[:, :, 0]
     nees = np.einsum("ij,ij->i", errors, solved)
-    inside = nees <= chi2.ppf(0.95, freedom)
+    inside = nees <= chi2_quantile(0.95, freedom)
     return Consistency(float(nees.mean() / freedom), float(inside.mean()))

@@ -12,6 +12,7 @@ from evo.core.filters import FilterException
 from evo.core.geometry import GeometryException
 from evo.core.trajectory import PoseTrajectory3D
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from airground.core.se3 import SE3
 
@@ -49,8 +50,10 @@ def trajectory_error(
     if len(poses) < MIN_POSES:
         return TrajectoryError(np.nan, np.nan, np.nan, np.nan, 0.0)
     reference = _evo([(stamp, true_pose(stamp)) for stamp, _ in poses])
-    se3, sim3 = _evo(poses), _evo(poses)
-    relative_m, path_m = _relative_rmse(deepcopy(reference), _evo(poses)), reference.path_length
+    se3 = _evo(poses)
+    sim3 = deepcopy(se3)
+    relative_m = _relative_rmse(deepcopy(reference), deepcopy(se3))
+    path_m = reference.path_length
     try:
         se3.align(deepcopy(reference))
         _, _, scale = sim3.align(deepcopy(reference), correct_scale=True)
@@ -81,9 +84,10 @@ def aligned_errors(
 
 
 def _evo(poses: list[tuple[int, SE3]]) -> PoseTrajectory3D:
+    xyzw = Rotation.from_matrix(np.array([pose.rotation for _, pose in poses])).as_quat()
     return PoseTrajectory3D(
         positions_xyz=np.array([pose.translation for _, pose in poses]),
-        orientations_quat_wxyz=np.array([np.roll(p.quaternion_xyzw(), 1) for _, p in poses]),
+        orientations_quat_wxyz=np.roll(np.where(xyzw[:, 3:] < 0, -xyzw, xyzw), 1, axis=1),
         timestamps=np.array([stamp for stamp, _ in poses]) / 1e9,
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import open3d as o3d
@@ -15,7 +16,9 @@ from airground.core.se3 import SE3
 from airground.errors import InputError, RecordingError
 from airground.io.ply_elements import columns, read_elements
 from sim.geometry.parts import Part, read_parts, write_parts
-from sim.world.world import World
+
+if TYPE_CHECKING:
+    from sim.world.world import World
 
 _EMPTY = np.zeros(0, [])
 

@@ -16,6 +16,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,14 +30,16 @@ from airground.io.layout import TRUTH
 from airground.io.lens import Lens
 from airground.io.tum import write_tum
 from sim.geometry.box import Box
-from sim.geometry.changes import Change
 from sim.recording.bodies_truth import BodySurfaces
 from sim.recording.row_poses import RowPoses, exact_row_poses
 from sim.recording.true_surface import TrueSurface
 from sim.robots.motion import ROBOTS, Motion, Robot
 from sim.robots.moving_bodies import MovingBody, read_bodies, write_bodies
 from sim.sensors.faults import Fault
-from sim.world.world import World
+
+if TYPE_CHECKING:
+    from sim.geometry.changes import Change
+    from sim.world.world import World
 
 _CHANGES = "changes.csv"
 """Its presence says that the MAV sees another surface than the ground robot."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +13,12 @@ from airground.core.arrays import read_only
 from airground.core.se3 import SE3
 from airground.errors import InputError
 from airground.io.array_files import UNREADABLE_ARRAYS, read_arrays
-from sim.robots.flight import fly, plan_flight
-from sim.robots.ground_robot import drive, floor_under, mounting, plan_drive
-from sim.robots.overlap import driven_path
 from sim.robots.robot_motion import ARRAY_NAMES, Mounting, RobotMotion
 from sim.scene import Scene
 from sim.world.magnetic_field import room_field
-from sim.world.world import World
+
+if TYPE_CHECKING:
+    from sim.world.world import World
 
 Robot = Literal["mav", "ground"]
 ROBOTS: tuple[Robot, ...] = ("mav", "ground")
@@ -144,6 +143,11 @@ def simulate_motion(
         InputError: The duration is not positive or too short to take off, or a path or
             `ground.stop_at_overlap` is impossible.
     """
+    # MuJoCo is needed to simulate, not to read what was simulated.
+    from sim.robots.flight import fly, plan_flight
+    from sim.robots.ground_robot import drive, floor_under, mounting, plan_drive
+    from sim.robots.overlap import driven_path
+
     length_s = scene.duration_s if duration_s is None else duration_s
     if not (np.isfinite(length_s) and length_s > 0):
         raise InputError(f"duration_s must be positive and finite, got {length_s}")

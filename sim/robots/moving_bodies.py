@@ -9,6 +9,7 @@ import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,9 @@ from sim.robots.motion import Motion, Robot
 from sim.robots.paths import planar_path
 from sim.scene import Scene
 from sim.scene.bodies import Body
-from sim.world.world import World
+
+if TYPE_CHECKING:
+    from sim.world.world import World
 
 GROUND_ROBOT = "ground_robot"
 """Name of the ground robot as a body."""

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import BSpline
 
 from airground.core.arrays import read_only
 from airground.errors import InputError
@@ -50,6 +49,8 @@ class SmoothCurve:
 
     def jet(self, times: ArrayLike) -> NDArray[np.float64]:
         """(3, N, D) value, first and second derivative; held constant outside its domain."""
+        from scipy.interpolate import BSpline  # a tenth of a second, only where paths are planned
+
         times = np.asarray(times, np.float64)
         count = len(self.controls)
         half = (DEGREE + 1) / 2

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import count, groupby, product
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +21,12 @@ from evaluation.measure.protocol.trials import spread_evenly
 from evaluation.table.limits import LOCATED_M
 from evaluation.table.row_writer import RowWriter
 from sim.geometry.surface import RayCaster
-from sim.recording.recorder import Flight
-from sim.recording.stills import Still, Stills
 from sim.scene import Scene
-from sim.world.world import World, build_world
+
+if TYPE_CHECKING:
+    from sim.recording.recorder import Flight
+    from sim.recording.stills import Still, Stills
+    from sim.world.world import World
 
 STAGE = "appearance"
 """Rows of one pair of images share their trial: `view_angle_deg`, `light_turn_deg` and `printed`
@@ -78,6 +81,8 @@ def looks(scene: Scene) -> list[Look]:
 
 def add_appearance(out: RowWriter, flight: Flight, places: int = PLACES) -> None:
     """Write the rows of one world, as the cameras of `flight` see it."""
+    from sim.world.world import build_world  # MuJoCo, which a report does not need
+
     chosen = viewed_places(build_world(flight.scene, flight.seed, pictures=False), places)
     trials = count()
     for _, group in groupby(looks(flight.scene), lambda look: (look.light_turn_deg, look.printed)):
@@ -92,6 +97,8 @@ def add_appearance(out: RowWriter, flight: Flight, places: int = PLACES) -> None
 @contextmanager
 def _cameras(flight: Flight, look: Look) -> Iterator[tuple[Stills, Stills]]:
     """The MAV's camera in the scene's light, and the ground robot's in the turned light."""
+    from sim.recording.stills import Stills
+
     rng = np.random.default_rng([flight.seed, 7])
     with Stills(_world(flight, look.printed, 0.0), flight.sensors, rng) as aerial:
         if look.light_turn_deg == 0:
@@ -103,6 +110,8 @@ def _cameras(flight: Flight, look: Look) -> Iterator[tuple[Stills, Stills]]:
 
 
 def _world(flight: Flight, printed: float | None, light_turn_deg: float) -> World:
+    from sim.world.world import build_world
+
     scene = flight.scene
     azimuth_deg = scene.light.azimuth_deg + light_turn_deg
     changed: dict[str, object] = {

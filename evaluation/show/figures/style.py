@@ -39,6 +39,8 @@ SMALL_PT = 7.0
 LABEL_PT = 7.5
 """Legends, and labels inside the axes [pt]."""
 PICTURE_DPI = 210
+LAYOUT_ROUNDS = 2
+"""Space for tick labels is known only after a first round has placed the axes."""
 
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -130,6 +132,7 @@ def save_picture(figure: Figure, folder: Path, name: str) -> None:
 @styled
 def write_png(figure: Figure, file: Path | IO[bytes]) -> None:
     """Write a figure as PNG; the same figure gives the same bytes."""
+    _lay_out(figure)
     figure.savefig(file, format="png", dpi=PICTURE_DPI, metadata={"Software": None})
 
 
@@ -138,10 +141,20 @@ def save_figure(figure: Figure, folder: Path, name: str) -> None:
     """Write `name`.png and `name`.pdf; the same figure gives the same bytes."""
     folder.mkdir(parents=True, exist_ok=True)
     save_picture(figure, folder, name)
-    # The layout is known by now; a second search for it takes as long as drawing.
-    figure.set_layout_engine("none")
     figure.savefig(
         folder / f"{name}.pdf",
         dpi=PICTURE_DPI,
         metadata={"CreationDate": None, "Producer": None, "Creator": None},
     )
+
+
+def _lay_out(figure: Figure) -> None:
+    """Settle the layout of a figure and take its engine away, with which Matplotlib would draw the
+    figure twice for each file."""
+    engine = figure.get_layout_engine()
+    if engine is None:
+        return
+    figure.set_dpi(PICTURE_DPI)
+    for _ in range(LAYOUT_ROUNDS):
+        engine.execute(figure)
+    figure.set_layout_engine(None)
