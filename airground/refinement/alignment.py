@@ -107,7 +107,8 @@ def _nearby(ground: F32, aerial_ground: F64, settings: Refinement, scale: float)
     if settings.local_search:
         margin += settings.local_search_radius_m + scale * TURNING_MARGIN_M
     low, high = aerial_ground.min(axis=0)[:2] - margin, aerial_ground.max(axis=0)[:2] + margin
-    inside = ((ground[:, :2] >= low) & (ground[:, :2] <= high)).all(axis=1)
+    x, y = ground[:, 0], ground[:, 1]
+    inside = (x >= low[0]) & (x <= high[0]) & (y >= low[1]) & (y <= high[1])
     result: F32 = ground[inside]
     return result
 

@@ -25,7 +25,9 @@ def without_strays(points: F32) -> F32:
     """The points (N >= 1, 3) [m] at most one extent outside the box that bounds the extent."""
     low, high = np.quantile(points[:, :2], CENTRAL, axis=0)
     side = (high - low).max()
-    inside = ((points[:, :2] >= low - side) & (points[:, :2] <= high + side)).all(axis=1)
+    (low_x, low_y), (high_x, high_y) = low - side, high + side
+    x, y = points[:, 0], points[:, 1]
+    inside = (x >= low_x) & (x <= high_x) & (y >= low_y) & (y <= high_y)
     result: F32 = points[inside]
     return result
 
