@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from airground.core.arrays import F32, F64, FAST, Floats
+from airground.core.arrays import C64, F32, F64, FAST, Floats
 
 COUNT, SUM_A, SUM_G, SUM_AA, SUM_GG, SUM_AG = range(6)
 
@@ -58,6 +58,40 @@ def zmssd(sums: Floats, min_count: float) -> F32:
         # sum((d - mean d)^2) = sum d^2 - (sum d)^2 / n with d = a - g.
         difference = sum_a - sum_g
         squares = sum_aa + sum_gg - 2 * sum_ag
+        costs[i] = max(squares - difference * difference / n, 0.0) / (2 * n)
+    return costs
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def difference_spectrum(mask_a: C64, a: C64, mask_g: C64, g: C64, out: C64) -> None:
+    """Spectrum of the sums of a - g, from those of masks and heights; written to `out`.
+    In one pass over the rows: the memory's speed counts."""
+    for i in range(len(out)):
+        mi, ai, mg, gi, line = mask_a[i], a[i], mask_g[i], g[i], out[i]
+        for j in range(len(line)):
+            line[j] = ai[j] * mg[j] - mi[j] * gi[j]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def squares_spectrum(mask_a: C64, a: C64, aa: C64, mask_g: C64, g: C64, gg: C64, out: C64) -> None:
+    """The same of the sums of (a - g)^2."""
+    two = np.float32(2)
+    for i in range(len(out)):
+        mi, ai, aai, mg, gi, ggi, line = mask_a[i], a[i], aa[i], mask_g[i], g[i], gg[i], out[i]
+        for j in range(len(line)):
+            line[j] = aai[j] * mg[j] + mi[j] * ggi[j] - two * (ai[j] * gi[j])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def zmssd_of_differences(sums: F32, min_count: float) -> F32:
+    """Eq. 2 [m^2] for the number of cells and the sums of height differences and of their squares
+    (N, 3); NaN where fewer than `min_count` cells overlap."""
+    costs = np.empty(len(sums), np.float32)
+    for i in range(len(sums)):
+        n, difference, squares = sums[i]
+        if n < min_count or n < 1:
+            costs[i] = np.nan
+            continue
         costs[i] = max(squares - difference * difference / n, 0.0) / (2 * n)
     return costs
 

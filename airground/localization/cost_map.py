@@ -20,9 +20,12 @@ from airground.localization.cost_kernels import (
     SUM_G,
     SUM_GG,
     about_mean,
+    difference_spectrum,
     one_minus_correlation,
+    squares_spectrum,
     sums_at_positions,
     zmssd,
+    zmssd_of_differences,
 )
 from airground.localization.turned_kernels import MARGIN, filled_cells, in_fours, sums_at_poses
 
@@ -44,8 +47,7 @@ def masked(heights: F32, margin: int = 0) -> Masked:
 
 def costs_of(sums: Floats, aerial_cells: int, config: Localization) -> F32:
     """(N,) costs of the configured kind for sums (N, 6) as in `cost_kernels`."""
-    # "More than" the fraction (Sec. VI-A), where the number of cells is whole.
-    min_count = np.floor(config.min_overlap * aerial_cells) + 0.5
+    min_count = least_count(aerial_cells, config)
     if config.cost == "zmssd":
         return zmssd(sums, min_count)
     return one_minus_correlation(sums, min_count, config.min_relief_m)
@@ -81,16 +83,7 @@ class OffsetSearch:
 
     def sums(self, aerial: HeightMap) -> F32:
         """(nx, ny, 6) sums over the overlap at every offset; heights are about the means."""
-        offset = lattice_index(aerial) - self._reach[0]
-        inside = (offset >= 0).all() and (
-            offset + aerial.heights.shape <= self._reach[1] - self._reach[0] + 1
-        ).all()
-        if not inside:
-            raise ValueError("the aerial map is larger than the given reach")
-        canvas = np.full(tuple(self._reach[1] - self._reach[0] + 1), np.nan, np.float32)
-        nx, ny = aerial.heights.shape
-        canvas[offset[0] : offset[0] + nx, offset[1] : offset[1] + ny] = aerial.heights
-        mask_a, a, aa = (np.conj(s, out=s) for s in self._transform(masked(canvas)))
+        mask_a, a, aa = self._aerial_spectra(aerial)
         mask_g, g, gg = self._spectra
         sums = np.empty((*self.shape, 6), np.float32)
         pairs = ((mask_a, mask_g), (a, mask_g), (mask_a, g), (aa, mask_g), (mask_a, gg), (a, g))
@@ -101,10 +94,46 @@ class OffsetSearch:
         np.rint(sums[..., COUNT], out=sums[..., COUNT])
         return sums
 
+    def difference_sums(self, aerial: HeightMap) -> F32:
+        """(nx, ny, 3) at every offset: number of overlapping cells, and sums over them of the
+        height differences, aerial minus ground, and of their squares; heights are about the means.
+
+        Sums are linear: they are combined before they are transformed back."""
+        mask_a, a, aa = self._aerial_spectra(aerial)
+        mask_g, g, gg = self._spectra
+        sums = np.empty((*self.shape, 3), np.float32)
+        product = np.empty_like(mask_g)
+        np.multiply(mask_a, mask_g, out=product)
+        self._correlate(product, sums[..., 0])
+        difference_spectrum(mask_a, a, mask_g, g, product)
+        self._correlate(product, sums[..., 1])
+        squares_spectrum(mask_a, a, aa, mask_g, g, gg, product)
+        self._correlate(product, sums[..., 2])
+        np.rint(sums[..., COUNT], out=sums[..., COUNT])
+        return sums
+
     def costs(self, aerial: HeightMap, config: Localization) -> F32:
         """(nx, ny) cost at every offset, NaN where too little overlaps."""
-        sums = self.sums(aerial).reshape(-1, 6)
-        return costs_of(sums, aerial.filled_cells, config).reshape(self.shape)
+        if config.cost == "zmssd":
+            differences = self.difference_sums(aerial).reshape(-1, 3)
+            costs = zmssd_of_differences(differences, least_count(aerial.filled_cells, config))
+        else:
+            costs = costs_of(self.sums(aerial).reshape(-1, 6), aerial.filled_cells, config)
+        return costs.reshape(self.shape)
+
+    def _aerial_spectra(self, aerial: HeightMap) -> tuple[C64, C64, C64]:
+        """Conjugate spectra of the mask, the heights and their squares of an aerial map."""
+        offset = lattice_index(aerial) - self._reach[0]
+        inside = (offset >= 0).all() and (
+            offset + aerial.heights.shape <= self._reach[1] - self._reach[0] + 1
+        ).all()
+        if not inside:
+            raise ValueError("the aerial map is larger than the given reach")
+        canvas = np.full(tuple(self._reach[1] - self._reach[0] + 1), np.nan, np.float32)
+        nx, ny = aerial.heights.shape
+        canvas[offset[0] : offset[0] + nx, offset[1] : offset[1] + ny] = aerial.heights
+        mask_a, a, aa = (np.conj(s, out=s) for s in self._transform(masked(canvas)))
+        return mask_a, a, aa
 
     def _transform(self, patch: Masked) -> tuple[C64, C64, C64]:
         spectrum = self._spectrum
@@ -146,6 +175,12 @@ def reach_of(aerial: HeightMap) -> I64:
     """(2, 2) first and last lattice index of a map."""
     first = lattice_index(aerial)
     return np.array([first, first + aerial.heights.shape - 1])
+
+
+def least_count(aerial_cells: int, config: Localization) -> float:
+    """Least number of cells of an overlap that counts: "more than" the fraction (Sec. VI-A), where
+    the number of cells is whole."""
+    return float(np.floor(config.min_overlap * aerial_cells) + 0.5)
 
 
 @dataclass(frozen=True, eq=False)

@@ -239,6 +239,19 @@ def test_transforms_of_filled_rows_alone_are_the_whole_ones() -> None:
         np.testing.assert_array_equal(found[..., index], expected)
 
 
+@pytest.mark.kernel
+def test_sums_of_differences_are_the_six_sums_combined() -> None:
+    rng = np.random.default_rng(4)
+    aerial, ground = random_map(rng, (14, 11), (-6, -4)), random_map(rng, (26, 30), (-12, -13))
+    search = OffsetSearch(ground, (0.1, -0.2), 1.0, reach_of(aerial))
+    count, sum_a, sum_g, sum_aa, sum_gg, sum_ag = np.moveaxis(search.sums(aerial), -1, 0)
+    found = search.difference_sums(aerial)
+    assert count.max() > 100
+    np.testing.assert_array_equal(found[..., 0], count)
+    np.testing.assert_allclose(found[..., 1], sum_a - sum_g, atol=1e-4)
+    np.testing.assert_allclose(found[..., 2], sum_aa + sum_gg - 2 * sum_ag, atol=1e-4)
+
+
 def under_offsets(ground: HeightMap, search: OffsetSearch, aerial: HeightMap) -> np.ndarray:
     """The ground heights that some offset lays the aerial map over, NaN outside the map."""
     padded = np.pad(ground.heights, 40, constant_values=np.nan)
