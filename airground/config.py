@@ -199,6 +199,9 @@ class Localization(Section):
     """Number of headings over the full circle, if searched."""
     heading_noise_deg: Positive = 1.0
     """Standard deviation of the heading's motion model, if searched [deg]."""
+    joint_maps: Annotated[int, Field(ge=0)] = 4
+    """If the heading is searched, the reported pose is moved to the nearby minimum of the costs of
+    so many newest aerial maps together; 0 leaves it at the particles."""
     estimate: Literal["mean", "mode"] = "mode"
     """Reported position: mean of all particles, or of those around the densest place."""
     redrawn_fraction: Fraction = 0.1
@@ -296,7 +299,12 @@ def _as_published(preset: PresetName, sigma: float) -> Config:
         fusion=Fusion(min_observations=1),
         height_maps=HeightMaps(cells_per_m=50.0),
         localization=Localization(
-            cost="zmssd", sigma=sigma, min_overlap=0.5, estimate="mean", redrawn_fraction=0.0
+            cost="zmssd",
+            sigma=sigma,
+            min_overlap=0.5,
+            joint_maps=0,
+            estimate="mean",
+            redrawn_fraction=0.0,
         ),
         refinement=Refinement(local_search=False, level_prior=False),
     )

@@ -4,6 +4,7 @@ Whether a belief may claim a position: Sec. VIII-C, and what the paper leaves op
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator
 
 import numpy as np
@@ -18,6 +19,7 @@ from airground.core.se3 import SE3
 from airground.localization.cost_map import Overlays
 from airground.localization.height_map_pair import HeightMapPair
 from airground.localization.hypotheses import CostVolume
+from airground.localization.joint_cost import SightedHeights, lowest_nearby
 from airground.localization.particles import densest_mode, mean_pose, resample, span, weights
 
 
@@ -35,6 +37,7 @@ class MonteCarloLocalizer:
         self._rng = rng
         self._particles: F64 | None = None
         self._position_mav = np.zeros(3)
+        self._newest: deque[SightedHeights] = deque(maxlen=self._local.joint_maps)
         self.belief: Belief | None = None
 
     def update(self, pair: HeightMapPair) -> Iterator[Event]:
@@ -48,6 +51,8 @@ class MonteCarloLocalizer:
         """
         position_mav = np.array(pair.position_mav, np.float64)
         yield HeightMapsMade(pair.stamp_ns, pair.aerial, pair.ground)
+        if pair.searched:
+            self._newest.append(SightedHeights(pair.aerial, pair.ground, position_mav))
 
         # Costs of all hypotheses: for the first particles, and for those drawn anew.
         volume = None
@@ -105,6 +110,8 @@ class MonteCarloLocalizer:
         if self._local.estimate == "mode":
             counted = particles[densest_mode(particles)]
         estimate = mean_pose(counted)
+        if self._newest:
+            estimate = lowest_nearby(self._newest, estimate, self._local)
         overlay = pair.overlay(estimate[None])
         offset = float(overlay.height_offsets()[0])
         T_ground_mav = motion_at(estimate, pair.position_mav, offset)

@@ -148,3 +148,21 @@ def test_an_empty_surface_is_refused_not_an_error(flight, points, heading):
     *_, last = localizer.update(pair)
     assert not last.belief.converged
     assert last.belief.refusal
+
+
+def test_a_known_heading_leaves_the_estimate_at_the_particles(flight):
+    with_joint, without = (
+        beliefs(flight.localize(changed(Config(), joint_maps=maps)))[-1] for maps in (4, 0)
+    )
+    np.testing.assert_array_equal(with_joint.estimate, without.estimate)
+
+
+def test_several_maps_together_sharpen_a_searched_heading(flight):
+    def worst_deg(maps):
+        config = changed(Config(), heading="search", headings=180, joint_maps=maps)
+        found = beliefs(flight.localize(config, heading=None))
+        off = [np.angle(np.exp(1j * (belief.estimate[2] - HEADING))) for belief in found[2:]]
+        return np.rad2deg(np.abs(off)).max()
+
+    assert worst_deg(4) < 0.8
+    assert worst_deg(4) < worst_deg(0)
