@@ -217,6 +217,8 @@ class Localization(Section):
     min_agreement: Fraction = 0.2
     """Least agreement of the heights beyond chance for a claim (Cohen's kappa,
     core/agreement.py)."""
+    max_self_similarity: Fraction = 0.8
+    """Largest correlation of the aerial map with itself, shifted to another place, for a claim."""
 
 
 class Refinement(Section):

@@ -89,7 +89,8 @@ def lowest_nearby(sighted: Sequence[SightedHeights], estimate: F64, config: Loca
 
     Returns:
         A minimum within `MODE_RADIUS_M` and `MAX_TURN_DEG`; the estimate where no map overlaps
-        enough. Maps that overlap too little where a search starts do not count in it.
+        enough. Maps that overlap too little where a search starts do not count in it. The second
+        search counts only where it costs less than sigma of the correlation.
     """
     position = sighted[-1].position_mav
 
@@ -115,7 +116,10 @@ def lowest_nearby(sighted: Sequence[SightedHeights], estimate: F64, config: Loca
         return estimate
     guess = _descend(estimate, estimate, costs)
     maps = with_overlap(guess)
-    return _descend(guess, estimate, truncated)
+    found = _descend(guess, estimate, truncated)
+    # Floor on floor has small differences everywhere: the structure must fit as before.
+    before, after = costs(np.array([guess, found]), guess) / len(maps)
+    return found if after <= before + config.sigma else guess
 
 
 def _descend(start: F64, centre: F64, costs_of: Callable[[F64, F64], F64]) -> F64:

@@ -21,6 +21,7 @@ from airground.localization.height_map_pair import HeightMapPair
 from airground.localization.hypotheses import CostVolume
 from airground.localization.joint_cost import SightedHeights, lowest_nearby
 from airground.localization.particles import densest_mode, mean_pose, resample, span, weights
+from airground.localization.self_similarity import why_ambiguous
 
 
 class MonteCarloLocalizer:
@@ -110,13 +111,13 @@ class MonteCarloLocalizer:
         if self._local.estimate == "mode":
             counted = particles[densest_mode(particles)]
         estimate = mean_pose(counted)
+        overlay = pair.overlay(estimate[None])
+        # Judged where the particles are: no search for a better fit has favoured that place.
+        refusal = self._why_refused(pair, particles, estimate, overlay)
         if self._newest:
             estimate = lowest_nearby(self._newest, estimate, self._local)
-        overlay = pair.overlay(estimate[None])
+            overlay = pair.overlay(estimate[None])
         offset = float(overlay.height_offsets()[0])
-        T_ground_mav = motion_at(estimate, pair.position_mav, offset)
-        laid = make_height_map(T_ground_mav @ pair.points_mav, pair.ground.cells_per_m)
-        refusal = why_refused(overlay, agreement(laid, pair.ground), particles, self._local)
         return Belief(
             stamp_ns=pair.stamp_ns,
             particles=particles,
@@ -124,10 +125,19 @@ class MonteCarloLocalizer:
             covariance=np.cov(particles[:, :2].T),
             cost=float(overlay.costs(self._local)[0]),
             height_offset=offset,
-            T_ground_mav=T_ground_mav,
+            T_ground_mav=motion_at(estimate, pair.position_mav, offset),
             converged=not refusal,
             refusal=refusal,
         )
+
+    def _why_refused(
+        self, pair: HeightMapPair, particles: F64, estimate: F64, overlay: Overlays
+    ) -> str:
+        offset = float(overlay.height_offsets()[0])
+        T_ground_mav = motion_at(estimate, pair.position_mav, offset)
+        laid = make_height_map(T_ground_mav @ pair.points_mav, pair.ground.cells_per_m)
+        refusal = why_refused(overlay, agreement(laid, pair.ground), particles, self._local)
+        return refusal or why_ambiguous(pair.aerial, self._local)
 
 
 def motion_at(estimate: F64, position_mav: F64, height_offset: float) -> SE3:

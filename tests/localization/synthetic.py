@@ -27,21 +27,39 @@ class Heap:
     raycasting: o3d.t.geometry.RaycastingScene
 
 
-def box_heap(seed: int, boxes: int = 80) -> Heap:
-    """A heap of random boxes over 5 x 4 m, parted by a corridor along x."""
-    rng = np.random.default_rng(seed)
-    pile = np.zeros((int(AREA_M[0] * 20) + 60, int(AREA_M[1] * 20) + 60))
-    scene = o3d.t.geometry.RaycastingScene()
-    _add(scene, np.eye(3), np.array([0.0, 0.0, -0.05]), np.array([14.0, 14.0, 0.1]))
-    for _ in range(boxes):
+@dataclass(frozen=True)
+class Box:
+    """A box on the pile: size [m], place (x, y) [m], turn about z and tilt about x and y [rad]."""
+
+    size: NDArray[np.float64]
+    place: tuple[float, float]
+    yaw: float
+    tilt: NDArray[np.float64]
+
+
+def random_boxes(rng: np.random.Generator, count: int) -> list[Box]:
+    """Boxes over 5 x 4 m on both sides of a corridor along x."""
+    boxes = []
+    for _ in range(count):
         size = rng.uniform((0.2, 0.2, 0.15), (0.6, 0.45, 0.45))
         side = rng.choice((-1.0, 1.0))
         reach = AREA_M[1] / 2 - CORRIDOR_M / 2
         x = rng.uniform(-AREA_M[0] / 2, AREA_M[0] / 2)
         y = side * (CORRIDOR_M / 2 + 0.2 + (reach - 0.2) * rng.beta(1.2, 1.6))
         yaw, tilt = rng.uniform(0, np.pi), rng.normal(0, 0.12, 2)
-        rotation = SE3.from_rotation_vector((0, 0, yaw)).rotation
-        rotation = SE3.from_rotation_vector((*tilt, 0.0)).rotation @ rotation
+        boxes.append(Box(size, (x, y), yaw, tilt))
+    return boxes
+
+
+def pile_up(boxes: list[Box]) -> Heap:
+    """Each box on top of those before it; one that would be higher than 1.1 m is left out."""
+    pile = np.zeros((int(AREA_M[0] * 20) + 60, int(AREA_M[1] * 20) + 60))
+    scene = o3d.t.geometry.RaycastingScene()
+    _add(scene, np.eye(3), np.array([0.0, 0.0, -0.05]), np.array([14.0, 14.0, 0.1]))
+    for box in boxes:
+        (x, y), size = box.place, box.size
+        rotation = SE3.from_rotation_vector((0, 0, box.yaw)).rotation
+        rotation = SE3.from_rotation_vector((*box.tilt, 0.0)).rotation @ rotation
         radius = 0.4 * min(size[0], size[1])
         columns = _columns(pile, x, y, radius)
         z = pile[columns].max() + size[2] / 2
@@ -50,6 +68,11 @@ def box_heap(seed: int, boxes: int = 80) -> Heap:
         pile[columns] = z + size[2] / 2
         _add(scene, rotation, np.array([x, y, z]), size)
     return Heap(scene)
+
+
+def box_heap(seed: int, boxes: int = 80) -> Heap:
+    """A heap of random boxes over 5 x 4 m, parted by a corridor along x."""
+    return pile_up(random_boxes(np.random.default_rng(seed), boxes))
 
 
 def flat_world() -> Heap:
