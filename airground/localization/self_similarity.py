@@ -1,4 +1,4 @@
-"""Whether an aerial map repeats itself, so that one place in it cannot be told from the next.
+"""Whether an aerial map repeats itself, so that places in it look the same.
 
 Along a row of identical boxes every period fits the ground map alike. Where that map ends, or where
 the particles have gathered in one of several equal places by chance, a wrong place may look like
