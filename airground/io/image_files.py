@@ -52,19 +52,22 @@ class ImageFiles:
     def ground(self, index: int) -> tuple[U8, F32]:
         size = self.ground_camera.width, self.ground_camera.height
         colour = read_colour(self.ground_colour_files[index], *size)
+        return colour, self.ground_depth(index)
+
+    def ground_depth(self, index: int) -> F32:
+        """(height, width) depth of the colour image's pixels alone [m], NaN where missing."""
+        size = self.ground_camera.width, self.ground_camera.height
         if self.registration is not None:
             size = self.registration.depth_size
         depth = read_depth(self.ground_depth_files[index], *size, self.depth_units_per_m)
-        if self.registration is not None:
-            depth = self.registration.registered(depth)
-        return colour, depth
+        return depth if self.registration is None else self.registration.registered(depth)
 
     def depth_png(self, index: int) -> bytes:
         """A file of depth of the colour image's pixels, in the recording's unit: the recording's
         own where it is registered."""
         if self.registration is None:
             return self.ground_depth_files[index].read_bytes()
-        return encode_png(depth_units(self.ground(index)[1], self.depth_units_per_m))
+        return encode_png(depth_units(self.ground_depth(index), self.depth_units_per_m))
 
     def check_present(self) -> None:
         """Raises RecordingError naming the first file that is missing."""

@@ -17,6 +17,7 @@ from evaluation.commands.options import (
     SensorOption,
     Shown,
     Verb,
+    in_megabytes,
     in_range,
     on_disk,
     work_s,
@@ -102,9 +103,11 @@ class Simulate(BenchmarkOptions, DatasetOptions, SensorOption, SeedOption, OutOp
         scene = subject.scene
         flight = int(in_range("--flight", self.flight))
         check_free(self.out)
-        seconds = self.duration_s or scene.duration_s
-        expected_s = work_s(seconds * RENDER_S_PER_S, self.workers())
-        announce(f"records {seconds:.0f} s over {scene.name}, {on_disk(seconds)}", expected_s)
+        seconds, every = self.duration_s or scene.duration_s, subject.sensors.every
+        expected_s = work_s(seconds * RENDER_S_PER_S / every, self.workers())
+        announce(
+            f"records {seconds:.0f} s over {scene.name}, {on_disk(seconds, every)}", expected_s
+        )
         if self.sealed is not None:
             asked_for = Flight(scene, seed, flight, subject.sensors, self.duration_s, dials)
             record_sealed(asked_for, self.out, self.sealed, self.workers())
@@ -289,9 +292,13 @@ class Export(OutOption, Verb):
     def main(self) -> None:
         from evaluation.datasets.formats import FORMATS, robots_for
         from evaluation.datasets.simulated import Simulated
-        from evaluation.setup.output import fresh_folder
-        from evaluation.setup.progress import step
+        from evaluation.setup.output import check_free, fresh_folder
+        from evaluation.setup.progress import announce, step
 
-        robots = robots_for(self.format, self.robot)
+        robots, chosen = robots_for(self.format, self.robot), FORMATS[self.format]
+        check_free(self.out)
+        with step("comparing digests"):
+            simulated = Simulated.open(self.recording)
+        announce(f"writes {self.format}, {in_megabytes(chosen.expected_mb(simulated, robots))}")
         with fresh_folder(self.out) as folder, step(f"writing {self.format}"):
-            FORMATS[self.format].write(folder, Simulated.open(self.recording), robots)
+            chosen.write(folder, simulated, robots)

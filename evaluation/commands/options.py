@@ -37,9 +37,13 @@ MEASURE_S_PER_S = 3.0
 """The paper's protocol with one kind of maps: 2 without baselines, 4 with all of them."""
 
 
-def on_disk(seconds: float) -> str:
-    """Size of a recording of so many seconds, in words."""
-    megabytes = RECORDED_MB_PER_S * seconds
+def on_disk(seconds: float, every: int = 1) -> str:
+    """Size of a recording of so many seconds, with every n-th image, in words."""
+    return in_megabytes(RECORDED_MB_PER_S * seconds / every)
+
+
+def in_megabytes(megabytes: float) -> str:
+    """A size, in words."""
     return f"about {megabytes / 1000:.1f} GB" if megabytes >= 1000 else f"about {megabytes:.0f} MB"
 
 

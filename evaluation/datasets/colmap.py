@@ -12,6 +12,8 @@ from evaluation.datasets.simulated import Simulated, copy_images
 from evaluation.datasets.views import PIXEL_CENTRE, View, Views, choose_views
 from sim.robots.motion import ROBOTS, Robot
 
+POINT_DECIMALS, PIXEL_DECIMALS = 6, 4
+"""Of points [m] and pixels."""
 MIN_VIEWS = 2
 """Images that a track needs at least."""
 OPENCV_COEFFICIENTS, FULL_OPENCV_COEFFICIENTS = 4, 8
@@ -37,7 +39,7 @@ def write_colmap_folder(folder: Path, simulated: Simulated, robots: tuple[Robot,
         for position, point in enumerate(points):
             tracks[point].append(f"{image_id} {position}")
     _write(model / "images.txt", lines)
-    _write(model / "points3D.txt", _point_lines(views, tracks))
+    _write(model / "points3D.txt", _point_lines(views, tracks, _errors_px(simulated, views)))
 
 
 def _camera_line(simulated: Simulated, robot: Robot) -> str:
@@ -70,17 +72,37 @@ def _pixels_line(view: View, shown: np.ndarray) -> str:
     pixels = (view.seen.pixels[shown] + PIXEL_CENTRE).tolist()
     points = view.seen.indices[shown].tolist()
     return " ".join(
-        f"{x:.4f} {y:.4f} {_point_id(point)}" for (x, y), point in zip(pixels, points, strict=True)
+        f"{x:.{PIXEL_DECIMALS}f} {y:.{PIXEL_DECIMALS}f} {_point_id(point)}"
+        for (x, y), point in zip(pixels, points, strict=True)
     )
 
 
-def _point_lines(views: Views, tracks: dict[int, list[str]]) -> list[str]:
-    """Ascending; the error is 0, since true points have none."""
+def _errors_px(simulated: Simulated, views: Views) -> np.ndarray:
+    """(N,) mean distance of each point's pixels from where its images show it, both as written:
+    what rounding leaves of true points and poses [px]; NaN for points in no image."""
+    sums, counts = np.zeros(len(views.cloud)), np.zeros(len(views.cloud))
+    points_world = np.round(views.cloud.points.astype(np.float64), POINT_DECIMALS)
+    for view in views.views:
+        seen, T_camera_world = view.seen, view.T_world_camera.inverse()
+        lens = simulated.truth.lens(view.robot)
+        pixels = lens.project(T_camera_world @ points_world[seen.indices])
+        off = np.round(seen.pixels + PIXEL_CENTRE, PIXEL_DECIMALS) - PIXEL_CENTRE - pixels
+        sums[seen.indices] += np.linalg.norm(off, axis=1)
+        counts[seen.indices] += 1
+    with np.errstate(invalid="ignore"):
+        return np.asarray(sums / counts)
+
+
+def _point_lines(views: Views, tracks: dict[int, list[str]], errors_px: np.ndarray) -> list[str]:
+    """Ascending by the point's number."""
     lines = []
     for point in sorted(tracks):
-        place = " ".join(f"{value:.6f}" for value in views.cloud.points[point].tolist())
+        place = " ".join(
+            f"{value:.{POINT_DECIMALS}f}" for value in views.cloud.points[point].tolist()
+        )
         colour = " ".join(map(str, views.cloud.colours[point].tolist()))
-        lines.append(f"{_point_id(point)} {place} {colour} 0 {' '.join(tracks[point])}")
+        error = f"{errors_px[point]:.6f}"
+        lines.append(f"{_point_id(point)} {place} {colour} {error} {' '.join(tracks[point])}")
     return lines
 
 

@@ -14,6 +14,7 @@ from evaluation.datasets.mcap import write_bag
 from evaluation.datasets.nerfstudio import write_nerfstudio_folder
 from evaluation.datasets.simulated import Simulated
 from evaluation.datasets.tum import write_tum_folder
+from evaluation.datasets.views import EVERY
 from evaluation.datasets.webdataset import write_webdataset
 from sim.robots.motion import ROBOTS, Robot
 
@@ -22,12 +23,31 @@ Robots = tuple[Robot, ...]
 
 @dataclass(frozen=True)
 class Format:
-    """A format that recordings are exported to; `because` says why it holds no other robots."""
+    """A format that recordings are exported to.
+
+    Attributes:
+        write: Function that fills an empty folder.
+        usual, possible: Robots that it holds by default, and those that it can hold.
+        because: Reason why it holds no other robots.
+        every: Step between the images that it holds.
+        depth: Whether it holds the ground robot's depth.
+    """
 
     write: Callable[[Path, Simulated, Robots], None]
     usual: Robots
     possible: tuple[Robots, ...]
     because: str = ""
+    every: int = 1
+    depth: bool = True
+
+    def expected_mb(self, simulated: Simulated, robots: Robots) -> float:
+        """Size of the images that are written [MB]: nearly all of an export. Depth that MCAP
+        compresses itself is about as large as the recording's."""
+        files = simulated.files
+        written = [file for robot in robots for file in simulated.image_files(robot)[:: self.every]]
+        if self.depth and "ground" in robots:
+            written += files.ground_depth_files[:: self.every]
+        return sum(file.stat().st_size for file in written) / 1e6
 
 
 MAV: Robots = ("mav",)
@@ -42,8 +62,9 @@ FORMATS = {
         GROUND,
         (GROUND, MAV),
         "one transforms.json is of one camera: give --robot mav or --robot ground",
+        every=EVERY,
     ),
-    "colmap": Format(write_colmap_folder, ROBOTS, (ROBOTS, MAV, GROUND)),
+    "colmap": Format(write_colmap_folder, ROBOTS, (ROBOTS, MAV, GROUND), every=EVERY, depth=False),
     "webdataset": Format(write_webdataset, ROBOTS, (ROBOTS, MAV, GROUND)),
 }
 

@@ -118,7 +118,7 @@ def _images(simulated: Simulated, robot: Robot) -> Iterator[Message]:
         image = ros.compressed_image(stamp, frame, files[index])
         yield stamp, f"{topic}/image_raw/compressed", image
         if robot == "ground":
-            _, depth = simulated.files.ground(index)
+            depth = simulated.files.ground_depth(index)
             yield stamp, f"{topic}/depth", ros.depth_image(stamp, frame, depth)
         T_world_camera = simulated.truth.T_world_camera(robot, stamp)
         yield stamp, f"/{robot}/truth/camera", ros.pose(stamp, WORLD, T_world_camera)

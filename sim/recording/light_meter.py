@@ -21,7 +21,6 @@ from sim.recording.render import Renderer
 from sim.robots.motion import ROBOTS, Motion, Robot
 from sim.robots.moving_bodies import MovingBody, read_bodies
 from sim.sensors.auto_exposure import ExposureCourse, regulate
-from sim.sensors.miscalibration import CAMERA_RATE_HZ
 
 WIDTH_PX = 80
 EVERY = 3
@@ -63,7 +62,7 @@ def with_exposure(plan: FramePlan) -> FramePlan:
             courses[robot] = regulate(
                 auto,
                 image.exposure_s,
-                CAMERA_RATE_HZ,
+                plan.preset.camera_hz,
                 times_ns,
                 _between(times_ns, every, metered),
             )
@@ -76,7 +75,7 @@ def _image_times(plan: FramePlan, robot: Robot) -> NDArray[np.int64]:
     """(N,) times at the camera's rate from the first image that is taken to the last [ns]."""
     table = plan.true.mav if robot == "mav" else plan.true.ground
     taken = plan.taken_ns[robot] + table.camera.time_offset_ns
-    period_ns = 1e9 / CAMERA_RATE_HZ
+    period_ns = 1e9 / plan.preset.camera_hz
     count = round(float(taken[-1] - taken[0]) / period_ns) + 1
     return np.asarray(taken[0] + np.rint(np.arange(count) * period_ns).astype(np.int64))
 

@@ -44,8 +44,8 @@ from sim.scene import Scene
 from sim.sensors.faults import Fault, faulty_field, faulty_imu, of_robot, placed
 from sim.sensors.faulty_frames import FaultyFrames
 from sim.sensors.imu import measure_field, measure_imu
-from sim.sensors.miscalibration import CAMERA_RATE_HZ, MAGNETOMETER_RATE_HZ, calibrate
-from sim.sensors.presets import SensorPreset
+from sim.sensors.miscalibration import MAGNETOMETER_RATE_HZ, calibrate
+from sim.sensors.presets import CAMERA_RATE_HZ, SensorPreset
 from sim.world.world import World, build_world, flight_world, painted, unlit_world
 
 # The cameras share no trigger; no exposure may reach beyond the motion.
@@ -190,7 +190,7 @@ def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan,
         scene.mav.camera_f_px, motion.mav.mounting, motion.ground.mounting, preset, calibration_rng
     )
     taken = {
-        robot: _within(motion, image_stamps(motion.stamps_ns, first), preset)
+        robot: _within(motion, image_stamps(motion.stamps_ns, first)[:: preset.every], preset)
         for robot, first in FIRST_IMAGE_NS.items()
     }
     frames = {r: FaultyFrames.of(taken[r], of_robot(faults, r)) for r in taken}

@@ -24,7 +24,6 @@ from sim.sensors.optics import EUROC_RADTAN, KINECT_RADTAN, misjudged
 from sim.sensors.presets import ADIS16448, NOMINAL, SensorPreset
 from sim.sensors.sensor_errors import CalibrationErrors, ImuNoise
 
-CAMERA_RATE_HZ = 30.0
 IMU_RATE_HZ = 200.0
 MAGNETOMETER_RATE_HZ = 50.0
 MAV_IMAGE_PX = (752, 480)
@@ -69,8 +68,18 @@ def calibrate(
     bent = rng.choice([-1.0, 1.0], 2)
     imu, magnetometer = _imu_table(preset.imu), _magnetometer_table(preset)
     robots = (
-        (mav, _camera(MAV_IMAGE_PX, mav_focal_px), preset.mav_optics, EUROC_RADTAN),
-        (ground, _camera(GROUND_IMAGE_PX, GROUND_FOCAL_PX), preset.ground_optics, KINECT_RADTAN),
+        (
+            mav,
+            _camera(MAV_IMAGE_PX, mav_focal_px, preset.camera_hz),
+            preset.mav_optics,
+            EUROC_RADTAN,
+        ),
+        (
+            ground,
+            _camera(GROUND_IMAGE_PX, GROUND_FOCAL_PX, preset.camera_hz),
+            preset.ground_optics,
+            KINECT_RADTAN,
+        ),
     )
     tables = []
     for number, (mounting, pinhole, optics, radtan) in enumerate(robots):
@@ -125,7 +134,7 @@ def _depth_cameras(
     the colour camera are, and by the same clock; its lens has no distortion."""
     sign, axis = rng.choice([-1.0, 1.0]), rng.standard_normal(3)
     shutter = {"readout_s": colour.readout_s, "time_offset_ns": colour.time_offset_ns}
-    true = _camera(GROUND_IMAGE_PX, INFRARED_FOCAL_PX).model_copy(update=shutter)
+    true = _camera(GROUND_IMAGE_PX, INFRARED_FOCAL_PX, colour.rate_hz).model_copy(update=shutter)
     nominal = misjudged(true, 1 + sign * errors.focal, 1.0)
     T_camera_depth = SE3(np.eye(3), np.array([-preset.depth_baseline_m, 0.0, 0.0]))
     turn = SE3.from_rotation_vector(errors.camera_to_imu * axis / np.linalg.norm(axis))
@@ -135,7 +144,7 @@ def _depth_cameras(
     )
 
 
-def _camera(size: tuple[int, int], focal_px: float) -> CameraTable:
+def _camera(size: tuple[int, int], focal_px: float, rate_hz: float) -> CameraTable:
     """A pinhole camera of the design."""
     width, height = size
     return CameraTable(
@@ -145,7 +154,7 @@ def _camera(size: tuple[int, int], focal_px: float) -> CameraTable:
         fy=focal_px,
         cx=(width - 1) / 2,
         cy=(height - 1) / 2,
-        rate_hz=CAMERA_RATE_HZ,
+        rate_hz=rate_hz,
         time_offset_ns=0,
     )
 

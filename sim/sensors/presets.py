@@ -20,6 +20,9 @@ from sim.sensors.sensor_errors import (
     MagneticNoise,
 )
 
+CAMERA_RATE_HZ = 30.0
+"""Rate of both cameras, of which a preset may keep every n-th image."""
+
 
 @dataclass(frozen=True)
 class SensorPreset:
@@ -35,6 +38,7 @@ class SensorPreset:
             makes no difference.
         faults: Failures of single sensors, for a while.
         exposure: Automatic exposure of both cameras; None for a fixed one.
+        every: The recorded images: every n-th one of `CAMERA_RATE_HZ`.
 
     Raises:
         InputError: Automatic exposure of cameras that are perfect, or take no time.
@@ -53,6 +57,12 @@ class SensorPreset:
     depth_registered: bool = True
     faults: tuple[Fault, ...] = ()
     exposure: AutoExposure | None = None
+    every: int = 1
+
+    @property
+    def camera_hz(self) -> float:
+        """Rate of the recorded images of both cameras [Hz]."""
+        return CAMERA_RATE_HZ / self.every
 
     def __post_init__(self) -> None:
         if self.exposure is not None and (self.image is None or self.image.exposure_s <= 0):

@@ -9,7 +9,7 @@ import numpy as np
 from airground.errors import InputError
 from sim.sensors.auto_exposure import CONSUMER_EXPOSURE
 from sim.sensors.faults import Fault
-from sim.sensors.presets import SensorPreset
+from sim.sensors.presets import CAMERA_RATE_HZ, SensorPreset
 from sim.sensors.sensor_errors import MagneticNoise
 from sim.world.magnetic_field import EARTH_FIELD_WORLD
 
@@ -35,6 +35,21 @@ def with_noise(preset: SensorPreset, factor: float) -> SensorPreset:
         ),
         imu=imu and imu.scaled(factor),
     )
+
+
+def with_rate(preset: SensorPreset, rate_hz: float) -> SensorPreset:
+    """The preset with images of both cameras at this rate [Hz].
+
+    Raises:
+        InputError: It is no whole part of `CAMERA_RATE_HZ`.
+    """
+    every = round(CAMERA_RATE_HZ / rate_hz)
+    if abs(every * rate_hz - CAMERA_RATE_HZ) > 1e-6 * CAMERA_RATE_HZ:
+        raise InputError(
+            f"sensors.camera_hz: {rate_hz:g} Hz is no {CAMERA_RATE_HZ:g} Hz divided by a whole "
+            "number, as 15, 10, 7.5, 6 and 5 are"
+        )
+    return replace(preset, every=every)
 
 
 def with_readout(preset: SensorPreset, readout_s: float) -> SensorPreset:

@@ -22,6 +22,7 @@ from sim.sensors.turned import (
     with_heading_error,
     with_imu_gap,
     with_noise,
+    with_rate,
     with_readout,
 )
 
@@ -171,6 +172,11 @@ DIALS = (
         "gamma of both cameras' response, beside the 2.2 of pictures; 1 shows light as it is, more "
         "brightens what is dark",
         lambda subject, value: replace(subject, sensors=with_gamma(subject.sensors, value)),
+    ),
+    Dial(
+        "sensors.camera_hz", "Hz", 5.0, 30.0,
+        "rate of both cameras' images: 30, or that divided by a whole number",
+        lambda subject, value: replace(subject, sensors=with_rate(subject.sensors, value)),
     ),
     Dial(
         "sensors.dropped_s", "s", 0.0, 5.0,

@@ -12,3 +12,4 @@ from evaluation.commands.options import on_disk
 )
 def test_the_size_of_a_recording_is_said_in_readable_units(seconds: float, said: str) -> None:
     assert on_disk(seconds) == said
+    assert on_disk(2 * seconds, every=2) == said

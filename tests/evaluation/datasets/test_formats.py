@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from airground.errors import InputError, RecordingError
 from airground.io.digests import file_digest
@@ -27,6 +29,40 @@ def test_the_same_recording_gives_the_same_bytes(
     again = Simulated.open(simulated.recording.path)
     FORMATS[name].write(tmp_path, again, robots_for(name, None))
     assert contents(tmp_path) == contents(exported(name))
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_the_expected_size_of_an_export_is_about_that_of_its_images(
+    name: str, simulated: Simulated, exported
+) -> None:
+    robots, folder = robots_for(name, None), exported(name)
+    large = [path for path in folder.rglob("*") if path.suffix in (".png", ".mcap", ".tar")]
+    size_mb = sum(path.stat().st_size for path in large) / 1e6
+    assert FORMATS[name].expected_mb(simulated, robots) == pytest.approx(size_mb, rel=0.1)
+
+
+def test_a_point_for_colmap_states_how_far_its_pixels_are_off(exported) -> None:
+    folder = exported("colmap") / "sparse" / "0"
+    lines = [line.split() for line in (folder / "points3D.txt").read_text().splitlines()[1:]]
+    errors_px = np.array([float(line[7]) for line in lines])
+    assert 0 < errors_px.mean() < 1e-3
+    # The first point, projected anew by what the files say.
+    cameras = {
+        line.split()[0]: [float(word) for word in line.split()[4:8]]
+        for line in (folder / "cameras.txt").read_text().splitlines()[1:]
+    }
+    images = (folder / "images.txt").read_text().splitlines()[1:]
+    off = []
+    for image_id, position in zip(lines[0][8::2], lines[0][9::2], strict=True):
+        pose, pixels = (images[2 * int(image_id) - 2 + i].split() for i in range(2))
+        w, x, y, z, *translation = map(float, pose[1:8])
+        point = np.array(lines[0][1:4], float)
+        x, y, z = Rotation.from_quat([x, y, z, w]).apply(point) + translation
+        fx, fy, cx, cy = cameras[pose[8]]
+        place = 3 * int(position)
+        seen = np.array(pixels[place : place + 2], float)
+        off.append(np.linalg.norm(seen - [fx * x / z + cx, fy * y / z + cy]))
+    assert errors_px[0] == pytest.approx(np.mean(off), abs=1e-6)
 
 
 @pytest.mark.parametrize(

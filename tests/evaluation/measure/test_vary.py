@@ -120,6 +120,7 @@ def test_dials_turn_what_they_name() -> None:
         "sensors.depth_registered": 0.0,
         "sensors.auto_exposure": 0.5,
         "sensors.gamma": 0.8,
+        "sensors.camera_hz": 15.0,
         "sensors.dropped_s": 2.0,
         "sensors.imu_gap_s": 0.5,
         "sensors.heading_error_deg": 5.0,
@@ -146,6 +147,7 @@ def test_dials_turn_what_they_name() -> None:
     optics = subject.sensors.mav_optics, subject.sensors.ground_optics
     assert {(o.lens, o.distortion, o.readout_s) for o in optics} == {("equidistant", 0.9, 0.02)}
     assert (subject.sensors.depth_baseline_m, subject.sensors.depth_registered) == (0.05, False)
+    assert subject.sensors.every == 2
     faults = [(fault.kind, fault.duration_s) for fault in subject.sensors.faults]
     assert faults == 2 * [("dropped", 2.0)] + 2 * [("imu_gap", 0.5)]
     # What is turned is still a valid scene.
