@@ -58,18 +58,20 @@ class Compare(OutOption, Verb):
         from evaluation.judge.runs import against, read_runs
         from evaluation.setup.output import fresh_folder
         from evaluation.setup.progress import step
-        from evaluation.show.comparison.page import PAGE, write_comparison
+        from evaluation.show.comparison.page import PAGE, Parted, write_comparison
         from evaluation.show.comparison.verdict_table import conclusion
-        from evaluation.show.rerun_view.differences import print_worsened
+        from evaluation.show.rerun_view.differences import hold_folders, print_worsened
 
         reference, *others = read_runs(self.runs)
         helds = [against(reference, run) for run in others]
+        first, *rest = self.runs
+        parted = [Parted(first, run, hold_folders(first, run, ACCEPTED)) for run in rest]
         with fresh_folder(self.out) as folder, step("drawing the comparison"):
-            write_comparison(folder, helds)
+            write_comparison(folder, helds, parted)
         for held in helds:
             print(f"{held.run.name} against {reference.name}: {conclusion(held.comparison)}")
-        for folder, held in zip(self.runs[1:], helds, strict=True):
-            print_worsened(held.comparison, self.runs[0], folder, ACCEPTED)
+        for held, each in zip(helds, parted, strict=True):
+            print_worsened(held.comparison, each.differences, first, each.run)
         print(self.out / PAGE)
 
 
@@ -105,9 +107,10 @@ class Check(Verb):
         comparison = compare(before, after)
         verdict_table.print_comparison(comparison)
         if self.against.is_dir():
-            from evaluation.show.rerun_view.differences import print_worsened
+            from evaluation.show.rerun_view.differences import hold_folders, print_worsened
 
-            print_worsened(comparison, self.against, self.results, ACCEPTED)
+            helds = hold_folders(self.against, self.results, ACCEPTED)
+            print_worsened(comparison, helds, self.against, self.results)
         for file, written in (
             (self.markdown, verdict_table.markdown),
             (self.junit, verdict_table.junit),

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from evaluation.judge.divergence import Held, first_divergence
 from evaluation.judge.runs import Against, Run
 from evaluation.judge.samples import Flight
 from evaluation.judge.verdict import MOVED, Judged
@@ -14,19 +15,48 @@ from evaluation.show.comparison.figures import comparison_figures
 from evaluation.show.comparison.verdict_table import HEADER, cells, conclusion, conditions
 from evaluation.show.report.failures import Failure, failures
 from evaluation.show.report.page import rendered, saved_picture
+from evaluation.show.rerun_view.differences import conclusion as where_they_part
+from evaluation.show.rerun_view.differences import differences_table
 
 PAGE = "compare.html"
 
 
-def write_comparison(out: Path, helds: Sequence[Against]) -> None:
+@dataclass(frozen=True)
+class Parted:
+    """Folders of two runs over one recording, and their first differences; none if unknown."""
+
+    reference: Path
+    run: Path
+    differences: Sequence[Held]
+
+    @property
+    def table(self) -> TextTable:
+        return differences_table(self.differences)
+
+    @property
+    def conclusion(self) -> str:
+        return where_they_part(first_divergence(self.differences))
+
+
+def write_comparison(
+    out: Path, helds: Sequence[Against], parted: Sequence[Parted] | None = None
+) -> None:
     """Write the page and `figures/` (PNG and PDF) into an existing folder.
-    All of `helds`, one at least, have the same reference."""
+
+    Args:
+        out: The folder.
+        helds: One run at least, all with the same reference.
+        parted: Where each run parts from the reference; None if that is not known.
+    """
     reference = helds[0].reference
     runs = [reference, *(held.run for held in helds)]
     page = rendered(
         "compare.html.j2",
         reference=reference.name,
-        sections=[_section(held) for held in helds],
+        sections=[
+            _section(held, None if parted is None else parted[number])
+            for number, held in enumerate(helds)
+        ],
         overview=overview_table(helds) if len(helds) > 1 else None,
         pictures=[saved_picture(drawn, out) for drawn in comparison_figures(helds)],
         differing=conditions_table(runs, common=False),
@@ -35,8 +65,9 @@ def write_comparison(out: Path, helds: Sequence[Against]) -> None:
     (out / PAGE).write_text(page, encoding="utf-8")
 
 
-def _section(held: Against) -> dict[str, object]:
+def _section(held: Against, parted: Parted | None) -> dict[str, object]:
     return {
+        "parted": parted if parted is not None and parted.differences else None,
         "name": held.run.name,
         "outcome": held.outcome(),
         "conclusion": conclusion(held.comparison),

@@ -33,19 +33,24 @@ def hold_files(first: RunFile, second: RunFile, accepted: Path) -> list[Held]:
     return hold(*read_traces(first, second), limits)
 
 
-def print_worsened(comparison: Comparison, reference: Path, run: Path, accepted: Path) -> None:
-    """Print since when a run differs, for each metric that got worse; nothing where not both
-    folders keep the same recording in rerun."""
+def hold_folders(reference: Path, run: Path, accepted: Path) -> list[Held]:
+    """Both runs, kind by kind; empty where not both folders keep the same recording in rerun."""
     files = [folder / RUN_FILE for folder in (reference, run)]
     if not all(file.is_file() for file in files) or files[0].samefile(files[1]):
-        return
+        return []
     try:
         for file in files:
             verify(file)
         first, second = map(RunFile.open, files, distinct_names([reference, run]))
-        helds = hold_files(first, second, accepted)
+        return hold_files(first, second, accepted)
     except InputError:
-        return
+        return []
+
+
+def print_worsened(
+    comparison: Comparison, helds: Sequence[Held], reference: Path, run: Path
+) -> None:
+    """Print since when a run differs, for each metric that got worse."""
     if rows := [_worse_row(judged, held) for judged, held in worsened(comparison, helds)]:
         title = f"since when it is worse: airground view {reference} {run}"
         print_table(TextTable(WORSE, tuple(rows)), title, left=(0, 2, 4), compact=True)
@@ -65,10 +70,15 @@ def print_differences(
 ) -> None:
     """Print where the second run parts from the first, kind by kind, the earliest one marked."""
     earliest = first_divergence(helds)
-    table = TextTable(HEADER, tuple(_row(held) for held in helds))
+    table = differences_table(helds)
     styles = ["bold" if held is earliest else "" for held in helds]
     title = f"{second} against {first}: {conclusion(earliest)}"
     print_table(table, title, console=console, left=(0, 3, 4), styles=styles, compact=True)
+
+
+def differences_table(helds: Sequence[Held]) -> TextTable:
+    """The first difference of each kind."""
+    return TextTable(HEADER, tuple(_row(held) for held in helds))
 
 
 def conclusion(earliest: Held | None) -> str:

@@ -11,6 +11,7 @@ import pytest
 
 from airground.config import Config
 from evaluation import cli
+from evaluation.judge.divergence import Difference, Held
 from evaluation.judge.runs import Against, Run, against, distinct_names
 from evaluation.judge.summary import build_summary
 from evaluation.judge.verdict import Verdict, compare
@@ -19,10 +20,12 @@ from evaluation.setup.settings import with_value, write_config
 from evaluation.show.comparison.figures import comparison_figures
 from evaluation.show.comparison.page import (
     PAGE,
+    Parted,
     conditions_table,
     failures_moved,
     moved_table,
     overview_table,
+    write_comparison,
 )
 from evaluation.table.rows import ResultTable
 from tests.evaluation.judge.flights import make_results
@@ -204,3 +207,16 @@ def test_names_tell_folders_apart() -> None:
     folders = [Path("/x/one/run"), Path("/x/two/run"), Path("/x/two/other")]
     assert distinct_names(folders) == ["one/run", "two/run", "two/other"]
     assert distinct_names(folders[1:]) == ["run", "other"]
+
+
+def test_the_page_says_where_two_runs_part(before: Run, tmp_path: Path) -> None:
+    held = against(before, made_run("after", make_results(range(10), {"error_m": 1.5})))
+    first = Difference(10_117_000_000, "0.1 m apart")
+    differences = [Held("surface", 7, "0.17 mm", None), Held("belief", 7, "1.46 mm", first)]
+    write_comparison(tmp_path, [held], [Parted(Path("a"), Path("b"), differences)])
+    page = (tmp_path / PAGE).read_text(encoding="utf-8")
+    assert "Where they part: the belief differs first, at 10.117 s" in page
+    assert "airground view a b" in page
+    assert "0.1 m apart" in page
+    write_comparison(tmp_path, [held], [Parted(Path("a"), Path("b"), [])])
+    assert "Where they part" not in (tmp_path / PAGE).read_text(encoding="utf-8")
