@@ -218,7 +218,8 @@ class Localization(Section):
     """Least agreement of the heights beyond chance for a claim (Cohen's kappa,
     core/agreement.py)."""
     max_self_similarity: Fraction = 0.8
-    """Largest correlation of the aerial map with itself, shifted to another place, for a claim."""
+    """Largest correlation of the aerial map with itself, and of the ground map with itself, shifted
+    to another place, for a claim."""
 
 
 class Refinement(Section):

@@ -137,7 +137,7 @@ class MonteCarloLocalizer:
         T_ground_mav = motion_at(estimate, pair.position_mav, offset)
         laid = make_height_map(T_ground_mav @ pair.points_mav, pair.ground.cells_per_m)
         refusal = why_refused(overlay, agreement(laid, pair.ground), particles, self._local)
-        return refusal or why_ambiguous(pair.aerial, self._local)
+        return refusal or why_ambiguous(pair.aerial, laid, pair.ground, self._local)
 
 
 def motion_at(estimate: F64, position_mav: F64, height_offset: float) -> SE3:
