@@ -165,6 +165,17 @@ def test_every_failure_leads_to_what_happened(table: ResultTable, page: tuple[Pa
     assert sequence.result.startswith(sequence.story.rows[3][1])
 
 
+def test_failures_lead_to_the_run_in_rerun_where_it_was_kept(
+    table: ResultTable, page: tuple[Path, str], tmp_path: Path
+) -> None:
+    _, html = page
+    assert ("run RECORDING --rerun" in html, "red crosses" in html) == (True, False)
+    (tmp_path / "run.rrd").touch()
+    write_report(tmp_path, table, None, RUN)
+    kept = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert ("run RECORDING --rerun" in kept, "red crosses" in kept) == (False, True)
+
+
 def test_a_sequence_without_estimate_is_a_failure() -> None:
     rows = [
         Row("indoor_a", 1, 0, BEST, "localization", metric, value, "", 0, i, note="no overlap")
