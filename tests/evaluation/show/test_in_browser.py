@@ -1,4 +1,4 @@
-"""Both pages in a real browser, at the width of a laptop and of a phone."""
+"""The pages in a real browser, at the width of a laptop and of a phone."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from airground.io.open_recording import open_robot
+from evaluation.datasets.gallery.page import dataset_page
+from evaluation.datasets.inspection.findings import Finding, Verdict
 from evaluation.judge.runs import against
 from evaluation.setup.condition import RunInfo
 from evaluation.show.comparison.page import PAGE, write_comparison
@@ -100,6 +103,20 @@ def test_the_comparison_fits_the_window(comparison: Path, opened: Browser, size:
         "Failures that appeared or disappeared",
         "Conditions",
     ]
+    check(opened, size)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_the_page_of_a_dataset_fits_the_window(
+    small: Path, tmp_path: Path, opened: Browser, size: str
+) -> None:
+    (tmp_path / "data").mkdir()
+    for name in ("first", LONG):
+        (tmp_path / "data" / name).symlink_to(small)
+    page = tmp_path / "page.html"
+    noted = [Finding(f"{LONG} mav", "truth", "none " * 30, Verdict.NOTED)]
+    page.write_text(dataset_page(tmp_path / "data", open_robot, noted), encoding="utf-8")
+    assert headings(opened, page, size) == ["Statistics", "Inspection", LONG, "first"]
     check(opened, size)
 
 
