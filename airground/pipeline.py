@@ -37,6 +37,7 @@ from airground.localization.height_map_pair import HeightMapPair
 from airground.localization.particle_filter import MonteCarloLocalizer
 from airground.refinement import refine
 from airground.slam.front_end import TrackedPose, Tracking
+from airground.slam.straight_images import StraightImages
 from airground.tracking import TrackedFrame
 
 NO_POSE = "no pose: a robot was lost, or had no map yet"
@@ -50,6 +51,10 @@ class Mapping:
         self._dense = DenseReconstruction(mav.camera, config)
         self._north: dict[Source, float | None] = {Source.MAV: None, Source.GROUND: None}
         self._correction: Trajectory | None = None
+        self._straight = {
+            Source.MAV: StraightImages(mav),
+            Source.GROUND: StraightImages(ground),
+        }
         self.ground_map: GroundMap | FixedMap = GroundMap(ground.camera, config.ground_mapping)
         self._poses: dict[Source, TrackedPose] = {}
         self._max_scale_sigma = config.view_selection.max_scale_sigma
@@ -61,6 +66,8 @@ class Mapping:
         self._north[robot], self._poses[robot] = frame.north_rad, pose
         if robot == Source.GROUND:
             self.correct_ground(frame.trajectory)
+        straight = self._straight[robot]
+        straight.follow(stamp_ns, pose)
         if pose.T_map_camera is None:
             if pose.tracking is Tracking.INITIALIZING:
                 self._scaled &= robot != Source.MAV  # what comes is another map
@@ -74,14 +81,14 @@ class Mapping:
         if pose.corrected:
             yield PosesCorrected(stamp_ns, robot)
         match frame.image:
-            case MavImage(image=image):
+            case MavImage() as image:
                 # A scale that was known stays with the map.
                 self._scaled |= scale_sigma is None or scale_sigma <= self._max_scale_sigma
                 if self._scaled:
-                    T_mav_camera = pose.T_map_camera
-                    yield from self._dense.add(stamp_ns, image, T_mav_camera, pose.depth_range)
+                    grey, T_mav_camera = straight.mav(image, pose.depth_range), pose.T_map_camera
+                    yield from self._dense.add(stamp_ns, grey, T_mav_camera, pose.depth_range)
             case GroundImage() as keyframe if self.ground_map.wants(pose.T_map_camera):
-                self.ground_map.add(keyframe, pose.T_map_camera)
+                self.ground_map.add(straight.ground(keyframe), pose.T_map_camera)
                 yield GroundMapExtended(stamp_ns, self.ground_map.keyframes)
 
     def correct_ground(self, trajectory: Trajectory | None) -> None:
