@@ -114,8 +114,12 @@ def test_what_cannot_be_read_is_a_finding(small: Path, tmp_path: Path) -> None:
     (broken / "mav0" / "cam0" / "data.csv").unlink()
     _, findings = inspect_dataset(broken)
     assert wrong(findings) == [("", "readable")]
+    _, of_all = inspect_dataset(tmp_path)
+    assert wrong(of_all) == [("broken", "readable")]
+    empty = tmp_path / "empty"
+    empty.mkdir()
     with pytest.raises(InputError, match=r"holds no recording; expected .*a dataset of ours"):
-        inspect_dataset(tmp_path)
+        inspect_dataset(empty)
 
 
 def turned(folder: Path, vector_deg: tuple[float, float, float]) -> None:
