@@ -14,7 +14,8 @@ from pydantic import Field
 from evaluation.judge import samples
 from evaluation.measure.protocol.negatives import CASES
 from evaluation.setup.checked_json import Count, Number, Part, Share, number
-from evaluation.table.intervals import Rate, chi2_quantile, wilson
+from evaluation.table.chi_squared import chi2_quantile
+from evaluation.table.intervals import Rate, wilson
 from evaluation.table.rows import CONTROL_SCENES, SEQUENCE_KEYS, ResultTable
 
 TO_BE_FOUND = "found"

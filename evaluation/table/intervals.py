@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import gammaincinv
 
 from evaluation.setup.text import MISSING, percent
 
@@ -106,9 +105,3 @@ def rate_within(values: ArrayLike, limit: float) -> Rate:
     """How many values stay within `limit`; failures do not."""
     array = with_failures(values)
     return wilson(int((array <= limit).sum()), len(array))
-
-
-def chi2_quantile(share: float, freedom: int) -> float:
-    """Value below which this share of a chi-squared distribution lies; that of `scipy.stats`, whose
-    import takes a third of a second."""
-    return float(2 * gammaincinv(freedom / 2, share))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from airground.core.se3 import SE3
 from airground.slam.front_end import TrackedPose
-from evaluation.table.intervals import chi2_quantile
+from evaluation.table.chi_squared import chi2_quantile
 from evaluation.table.row_writer import RowWriter
 from evaluation.table.tracked_share import first_motion_ns, tracked_share
 from evaluation.table.tracking_log import FrontEndLog, Tracked

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from scipy.stats import chi2
 
-from evaluation.table.intervals import chi2_quantile
+from evaluation.table.chi_squared import chi2_quantile
 
 
 def test_quantiles_of_chi2_are_those_of_scipy_stats() -> None:
