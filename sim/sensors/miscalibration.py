@@ -67,24 +67,17 @@ def calibrate(
     axes = rng.standard_normal((2, 3))
     bent = rng.choice([-1.0, 1.0], 2)
     imu, magnetometer = _imu_table(preset.imu), _magnetometer_table(preset)
-    robots = (
-        (
-            mav,
-            _camera(MAV_IMAGE_PX, mav_focal_px, preset.camera_hz),
-            preset.mav_optics,
-            EUROC_RADTAN,
+    lenses = (
+        preset.mav_optics.applied_to(
+            _camera(MAV_IMAGE_PX, mav_focal_px, preset.camera_hz), EUROC_RADTAN
         ),
-        (
-            ground,
-            _camera(GROUND_IMAGE_PX, GROUND_FOCAL_PX, preset.camera_hz),
-            preset.ground_optics,
-            KINECT_RADTAN,
+        preset.ground_optics.applied_to(
+            _camera(GROUND_IMAGE_PX, GROUND_FOCAL_PX, preset.camera_hz), KINECT_RADTAN
         ),
     )
     tables = []
-    for number, (mounting, pinhole, optics, radtan) in enumerate(robots):
-        focal, clock = signs[2 * number], signs[2 * number + 1]
-        lens = optics.applied_to(pinhole, radtan)
+    for number, (mounting, lens) in enumerate(zip((mav, ground), lenses, strict=True)):
+        focal, clock = signs[2 * number : 2 * number + 2]
         offset_ns = int(clock * errors.time_offset_ns)
         true_camera = lens.model_copy(update={"time_offset_ns": offset_ns})
         nominal_camera = misjudged(
@@ -106,25 +99,37 @@ def calibrate(
             )
         )
         tables.append((true, nominal))
-    scale = 1 + signs[4] * errors.depth_scale
     (mav_true, mav_nominal), (ground_true, ground_nominal) = tables
-    delay_ns, has_camera = preset.depth_delay_ns, preset.depth_baseline_m > 0
-    depth_true = DepthTable(units_per_m=DEPTH_UNITS_PER_M * scale, delay_ns=delay_ns)
-    registered = DepthTable(units_per_m=DEPTH_UNITS_PER_M, delay_ns=delay_ns)
-    measured = registered
-    if has_camera:
-        cameras = _depth_cameras(preset, ground_true.camera, errors, rng)
-        depth_true, measured = (
-            DepthTable(**dict(table) | camera)
-            for table, camera in zip((depth_true, registered), cameras, strict=True)
-        )
-    driven = has_camera and preset.depth_registered
+    scale = 1 + signs[4] * errors.depth_scale
+    depth_true, registered, measured = _depth_tables(preset, ground_true.camera, scale, errors, rng)
+    driven = preset.depth_baseline_m > 0 and preset.depth_registered
     stated = registered if driven else measured
     return Calibrations(
         CalibrationTable(mav=mav_true, ground=GroundTable(**dict(ground_true), depth=depth_true)),
         CalibrationTable(mav=mav_nominal, ground=GroundTable(**dict(ground_nominal), depth=stated)),
         GroundTable(**dict(ground_nominal), depth=measured) if driven else None,
     )
+
+
+def _depth_tables(
+    preset: SensorPreset,
+    colour: CameraTable,
+    scale: float,
+    errors: CalibrationErrors,
+    rng: np.random.Generator,
+) -> tuple[DepthTable, DepthTable, DepthTable]:
+    """True depth as measured; nominal depth as registered to the colour camera, and as measured."""
+    delay_ns = preset.depth_delay_ns
+    true = DepthTable(units_per_m=DEPTH_UNITS_PER_M * scale, delay_ns=delay_ns)
+    registered = DepthTable(units_per_m=DEPTH_UNITS_PER_M, delay_ns=delay_ns)
+    if preset.depth_baseline_m <= 0:
+        return true, registered, registered
+    cameras = _depth_cameras(preset, colour, errors, rng)
+    true, measured = (
+        DepthTable(**dict(table) | camera)
+        for table, camera in zip((true, registered), cameras, strict=True)
+    )
+    return true, registered, measured
 
 
 def _depth_cameras(
