@@ -25,6 +25,8 @@ def main() -> int:
     words.add_argument("--maps", type=Path, default=Path("negatives"), help="folder of their maps")
     words.add_argument("--case", type=int, help="only this case, with every line")
     asked = words.parse_args()
+    if min(asked.count, asked.heaps) < 1 or min(asked.seed, asked.first, asked.case or 0) < 0:
+        words.error("--count and --heaps must be at least 1, other numbers at least 0")
     flown = flights(asked.heaps, asked.maps)
     found, tried = [], 0
     numbers = count_up(asked.first) if asked.case is None else [asked.case]
