@@ -7,7 +7,7 @@ from pathlib import Path
 from tests.kills.victim import Command
 from tests.sim.small_flight import SCENE
 
-QUICK = ("protocol.sequences_per_flight=1", "protocol.trials=2", "protocol.baselines=0")
+QUICK = ("protocol.sequences_per_flight=1", "protocol.trials=2")
 SAME: dict[str, tuple[str, ...]] = {
     "simulate": (),
     "export": (),
@@ -33,7 +33,7 @@ def commands(folder: Path) -> dict[str, tuple[str, ...]]:
         "run": ("run", recording, *oracle),
         "live": ("live", recording, "--rate", "2"),
         "sweep": ("sweep", "--vary", "localization.particles=50,80", *flights),
-        "reproduce": ("reproduce", "--alone", *flights),
+        "reproduce": ("reproduce", "--alone", *flights, "--set", "protocol.baselines=0"),
     }
 
 
