@@ -9,7 +9,7 @@ PYTEST := $(PYTHON_IN_VENV) -m pytest -q --numprocesses=$(shell nproc) --maxproc
 
 demo: $(READY)
 	rm -rf $(OUT)
-	.venv/bin/airground reproduce --quick --out $(OUT) $(if $(RECORDINGS),--recordings $(RECORDINGS))
+	.venv/bin/airground reproduce --quick --out $(OUT) $(if $(RECORDINGS),--recordings '$(RECORDINGS)')
 
 setup: $(READY)
 
@@ -44,12 +44,14 @@ docs: $(READY)
 	.venv/bin/sphinx-build -W --keep-going -q -b html docs results/docs
 
 # Did a change make it worse? Against evaluation/accepted.json; docs/check_a_change.md.
-# RESUME=1 uses what OUT has of the same sources; RECORDINGS=DIR keeps the recordings there.
+# RESUME=1 uses what OUT has of the same sources. Recordings (8 GiB) are kept until the simulator
+# changes; RECORDINGS=DIR keeps them elsewhere, RECORDINGS= keeps none.
 regression: OUT = results/regression
+regression: RECORDINGS = $(shell scripts/kept_recordings results)
 regression: $(READY)
 	$(if $(RESUME),,rm -rf $(OUT))
 	.venv/bin/airground reproduce --suite fast --out $(OUT) \
-		$(if $(RECORDINGS),--recordings $(RECORDINGS),--render)
+		$(if $(RECORDINGS),--recordings '$(RECORDINGS)',--render)
 	.venv/bin/airground check $(OUT)
 
 format: $(READY)
