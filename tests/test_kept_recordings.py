@@ -44,12 +44,14 @@ def kept(project: Path, free_gib: int = 100) -> Path | None:
 
 def test_the_folder_stays_while_the_simulator_does(project: Path) -> None:
     first = kept(project)
-    assert first is not None and first.parent == project / "results"
+    assert first is not None
+    assert first.parent == project / "results"
     first.mkdir()
     (project / "sim/__pycache__").mkdir()
     (project / "sim/__pycache__/file.pyc").write_text("compiled")
     (project / "scripts/other").write_text("no part of the simulator")
-    assert kept(project) == first and first.exists()
+    assert kept(project) == first
+    assert first.exists()
 
 
 @pytest.mark.parametrize("name", [*(f"{name}/file.py" for name in SIMULATOR), "requirements.lock"])
@@ -60,8 +62,10 @@ def test_a_change_of_the_simulator_removes_what_it_recorded(project: Path, name:
     (project / "results/regression").mkdir()
     (project / name).write_text("changed")
     second = kept(project)
-    assert second is not None and second != first
-    assert not first.exists() and (project / "results/regression").exists()
+    assert second is not None
+    assert second != first
+    assert not first.exists()
+    assert (project / "results/regression").exists()
 
 
 def test_a_full_disk_keeps_none_but_uses_what_is_there(project: Path) -> None:
