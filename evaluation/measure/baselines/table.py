@@ -8,10 +8,12 @@ from airground.pipeline import locate
 from airground.refinement import refine
 from evaluation.measure.baselines.feature_matching import asift, sift
 from evaluation.measure.baselines.fpfh_ransac import fpfh_ransac_icp
+from evaluation.measure.baselines.gradient_particles import gradient_particles
 from evaluation.measure.baselines.height_search import ncc_search, phase_correlation, zmssd_search
 from evaluation.measure.baselines.interface import Answer, Baseline, Given
 from evaluation.measure.baselines.kiss_matcher import kiss_matcher_icp
 from evaluation.measure.baselines.registration import icp_from_prior
+from evaluation.measure.baselines.scan_context import scan_context
 
 
 def first_belief(given: Given) -> Answer:
@@ -63,6 +65,10 @@ BASELINES = (
         HEIGHTS,
         phase_correlation,
         module="skimage.registration",
+    ),
+    Baseline("scan_context", "ring keys and scan context of height maps", HEIGHTS, scan_context),
+    Baseline(
+        "gradients", "gradients of height maps, clustered particles", HEIGHTS, gradient_particles
     ),
     Baseline("fpfh", "FPFH, RANSAC, ICP", CLOUDS, fpfh_ransac_icp),
     Baseline("kiss", "KISS-Matcher, ICP", CLOUDS, kiss_matcher_icp, module="kiss_matcher"),
