@@ -60,6 +60,10 @@ class Mapping:
         self._max_scale_sigma = config.view_selection.max_scale_sigma
         self._scaled = False
 
+    def reserve(self) -> None:
+        """Take the largest working memory from the system, so that no frame waits for it."""
+        self._dense.reserve()
+
     def take(self, frame: TrackedFrame) -> Iterator[Event]:
         """Take in one frame; those of both robots come in order of time."""
         robot, pose, stamp_ns = frame.robot, frame.pose, frame.stamp_ns

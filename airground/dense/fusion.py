@@ -32,6 +32,12 @@ class Fusion:
         self.spacing = 2.0 / bins
         self._memory: F32 | None = None
 
+    def reserve(self, shape: tuple[int, int, int]) -> None:
+        """Take the working memory for a volume of this shape from the system, zeroed: a write to
+        each page, which the first surface would wait for."""
+        self._memory = np.empty((5, *shape), np.float32)
+        self._memory.fill(0.0)
+
     def fuse(self, counts: U32) -> F32:
         """The field phi (rows, planes, columns) for the packed histogram n(v, j) of that shape.
         It is valid until the next call."""

@@ -53,6 +53,14 @@ class DenseReconstruction:
         self._counts: U32 | None = None
         self._newest_ns = 0
 
+    def reserve(self) -> None:
+        """Take the memory of fusion from the system before the first image arrives: on a virtual
+        machine that takes half a second, by which the first surface would be late."""
+        columns, rows, planes = self.config.fusion.voxels
+        self._counts = np.empty((rows, planes, columns), np.uint32)
+        self._counts.fill(0)
+        self._fusion.reserve(self._counts.shape)
+
     def add(
         self,
         stamp_ns: int,

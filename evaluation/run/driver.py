@@ -77,6 +77,7 @@ def drive(
     images = sum(len(recording.of(robot).camera_stamps) for robot in Source)
     with step("running", images, "images") as running:
         warm_up_mapping(setup.config, np.random.default_rng(0))
+        pipeline.mapping.reserve()
         settle()
         tracking.wait_until_ready()
         started_s, processor_s = time.perf_counter(), time.process_time()

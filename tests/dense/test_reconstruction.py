@@ -44,7 +44,10 @@ def step_flight() -> Flight:
 
 
 def reconstruct(config: Config, poses: list[SE3], images: list[NDArray]) -> list[Event]:
-    dense = DenseReconstruction(CAMERA, config)
+    return fly(DenseReconstruction(CAMERA, config), poses, images)
+
+
+def fly(dense: DenseReconstruction, poses: list[SE3], images: list[NDArray]) -> list[Event]:
     events: list[Event] = []
     for i, (pose, image) in enumerate(zip(poses, images, strict=True)):
         events += dense.add(i * 33_333_333, image, pose)
@@ -54,6 +57,22 @@ def reconstruct(config: Config, poses: list[SE3], images: list[NDArray]) -> list
 @pytest.fixture(scope="module")
 def step_events(step_flight: Flight) -> list[Event]:
     return reconstruct(SMALL, *step_flight[1:])
+
+
+def test_reserved_memory_serves_the_first_surface(
+    step_flight: Flight, step_events: list[Event]
+) -> None:
+    dense = DenseReconstruction(CAMERA, SMALL)
+    dense.reserve()
+    taken = dense._fusion._memory, dense._counts
+    events = fly(dense, *step_flight[1:])
+    assert taken[0] is dense._fusion._memory
+    assert taken[1] is dense._counts
+    expected, made = (
+        next(event.surface for event in some if isinstance(event, SurfaceCast))
+        for some in (step_events, events)
+    )
+    np.testing.assert_array_equal(made.depth, expected.depth)
 
 
 def test_step_is_recovered(step_flight: Flight, step_events: list[Event]) -> None:
