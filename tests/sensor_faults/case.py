@@ -106,10 +106,10 @@ def outcome(part: RobotRecording[Any], truth: Truth, faults: Sequence[Fault]) ->
         place = traceback.extract_tb(error.__traceback__)[-1]
         said = f"{type(error).__name__} at {Path(place.filename).name}:{place.lineno}"
         return Outcome(0, 0, np.nan, np.nan, np.nan, np.nan, np.nan, said)
-    return _judged(poses, truth, faults[0].robot, start_ns, end_ns, ahead_ns)
+    return judged(poses, truth, faults[0].robot, start_ns, end_ns, ahead_ns)
 
 
-def _judged(
+def judged(
     poses: Sequence[TrackedPose],
     truth: Truth,
     robot: Any,
@@ -117,6 +117,10 @@ def _judged(
     end_ns: int,
     ahead_ns: int,
 ) -> Outcome:
+    """Hold poses against the truth, from the start to the end of the faults and on.
+
+    A clock that stepped is `ahead_ns` from the start on; 0 for other faults."""
+
     def taken(pose: TrackedPose) -> int:
         return pose.stamp_ns - (ahead_ns if pose.stamp_ns >= start_ns + ahead_ns else 0)
 
