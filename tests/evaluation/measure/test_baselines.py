@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -139,11 +140,45 @@ def test_a_missing_module_is_said_and_not_counted() -> None:
     assert row[3] == f"not run\n{reason}"
 
 
-def test_what_is_not_installed_is_found_out() -> None:
+def test_what_is_not_installed_is_found_out_with_how_to_install_it() -> None:
+    made_up = Baseline("x", "x", "x", echo, module="airground_no_such_module", install="do this")
+    reason = "airground_no_such_module is not installed: do this"
+    assert measure.why_not_run(made_up) == reason
+    assert measure.why_not_run(Baseline("x", "x", "x", echo, module="numpy.linalg")) == ""
+    assert measure.why_not_run(BASELINES[0]) == ""
+
+
+def test_what_a_baseline_loads_is_loaded_before_its_first_answer() -> None:
+    loaded = []
+    ready = Baseline("x", "x", "x", echo, prepare=lambda: loaded.append(1))
+    assert measure.why_not_run(ready) == ""
+    assert loaded == [1]
+
+    def no_weights() -> None:
+        raise ImportError("no weights", name="weights")
+
+    lacking = Baseline("x", "x", "x", echo, prepare=no_weights, install="do this")
+    assert measure.why_not_run(lacking) == "weights is not installed: do this"
+
+
+def test_a_baseline_that_is_not_installed_is_not_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its one row says how to install it, and is no answer of any trial."""
     made_up = Baseline("x", "x", "x", echo, module="airground_no_such_module")
-    assert not measure._is_installed(made_up)
-    assert measure._is_installed(Baseline("x", "x", "x", echo, module="numpy.linalg"))
-    assert measure._is_installed(BASELINES[0])
+    monkeypatch.setattr(measure, "BASELINES", (made_up, Baseline("y", "y", "y", echo)))
+    monkeypatch.setattr(measure, "GroundViews", lambda *_: None)
+    given = given_of(boxes_on_floor(0.1))
+    front_end = SimpleNamespace(live_poses=list)
+    maps = SimpleNamespace(
+        sightings=[given.sighting], tracked={"ground": SimpleNamespace(front_end=front_end)}
+    )
+    out = RowWriter("indoor_a", 0, 0, CONDITION)
+    measure.add_baselines(
+        out, None, closed_truth(given), Config(), maps, (0, 0), Protocol(trials=1, baselines=1)  # type: ignore[arg-type]
+    )  # fmt: skip
+    metrics = [(row.metric, row.note) for row in out.rows if row.metric.startswith("x_")]
+    how = "airground_no_such_module is not installed: pip install '.[baselines]'"
+    assert metrics == [("x_missing", how)]
+    assert [row.value for row in out.rows if row.metric == "y_claimed"] == [0.0]
 
 
 def test_no_baselines_no_table() -> None:
@@ -175,7 +210,8 @@ def test_the_twin_tries_the_baselines_that_match_images() -> None:
     assert isinstance(verb, Reproduce)
     protocol = verb.plan().protocol
     assert protocol.baselines == 10
-    assert [baseline.name for baseline in measure.baselines_asked(protocol)] == ["sift", "asift"]
+    names = [baseline.name for baseline in measure.baselines_asked(protocol)]
+    assert names == ["sift", "asift", "xfeat", "disk"]
     assert measure.baselines_asked(Protocol()) == list(BASELINES)
 
 
