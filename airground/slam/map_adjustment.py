@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,26 +10,17 @@ from airground.config import KeyframeSlam
 from airground.core.arrays import F64, I64
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from airground.slam.bundle_adjustment import (
-    Adjustment,
-    InertialFactor,
-    Observations,
-    Role,
-    Settings,
-    States,
-    adjust,
-)
+from airground.slam.bundle_adjustment import Role, Settings, adjust
 from airground.slam.inertial.joining import join
 from airground.slam.inertial.preintegration import Preintegration
+from airground.slam.map_problem import MapProblem
 from airground.slam.rig_state import RigState
-from airground.slam.sparse_map import SparseMap
+from airground.slam.sparse_map import Keyframe, SparseMap
 
-MAX_RESIDUAL_SIGMAS = 3.5
-"""An observation farther off than this was of something else."""
-GLOBAL_ITERATIONS = 15
-WINDOW_DECREASE, GLOBAL_DECREASE = 1e-5, 1e-6
-"""Adjustment ends when a step lowers the cost by less than this share. The scale of a whole map
-moves far for little cost."""
+WINDOW_DECREASE = 1e-5
+"""Adjustment of a window ends when a step lowers the cost by less than this share."""
+GLOBAL = Settings(iterations=15, relative_decrease=1e-6, covariance=False)
+"""For a whole map, whose scale moves far for little cost."""
 
 FIRST_ALL = 8
 ALL_GROWTH = 1.5
@@ -88,25 +78,25 @@ class MapAdjuster:
         settings = Settings(self.parameters.iterations, relative_decrease=WINDOW_DECREASE)
         return self._adjust(fixed + free, roles, inertial, settings)
 
-    def adjust_all(self, inertial: bool) -> F64 | None:
-        """Move the whole map.
+    def adjust_all(self, inertial: bool) -> None:
+        """Move the whole map, as `whole_map` has it."""
+        keyframes = self.map.keyframes
+        self.settle(keyframes[-1])
+        self._adjust(list(range(len(keyframes))), self._roles(inertial), inertial, GLOBAL)
+
+    def whole_map(self, inertial: bool) -> MapProblem:
+        """The whole map as it is, to be adjusted with the settings `GLOBAL`.
 
         With an IMU, place and heading of the newest keyframe stay, so that a better vertical
         turns the past about the robot instead of moving the robot about the past. Without,
         the first keyframe stays, since only there it is known where up is. Keyframes that
         culling left without their inertial motion stay in either case.
         """
-        keyframes = self.map.keyframes
-        count = len(keyframes)
-        roles = np.full(count, Role.FREE)
-        roles[[keyframe.held for keyframe in keyframes]] = Role.FIXED
-        if not inertial:
-            roles[0] = Role.FIXED
-        elif not (roles == Role.FIXED).any():
-            roles[-1] = Role.GAUGE
-        self.settled_ns = keyframes[-1].stamp_ns - SETTLING_NS
-        settings = Settings(GLOBAL_ITERATIONS, relative_decrease=GLOBAL_DECREASE)
-        return self._adjust(list(range(count)), roles, inertial, settings)
+        return self._problem(list(range(len(self.map.keyframes))), self._roles(inertial), inertial)
+
+    def settle(self, newest: Keyframe) -> None:
+        """The whole map up to a keyframe was adjusted."""
+        self.settled_ns = newest.stamp_ns - SETTLING_NS
 
     def all_due(self) -> bool:
         """Whether the newest keyframe makes it time to adjust the whole map; to be asked once."""
@@ -141,6 +131,17 @@ class MapAdjuster:
         for neighbour in (keyframe - 1, keyframe + 1):
             self.map.keyframes[neighbour].held |= inertial
 
+    def _roles(self, inertial: bool) -> I64:
+        """(K,) `Role` of each keyframe where all are adjusted."""
+        keyframes = self.map.keyframes
+        roles = np.full(len(keyframes), Role.FREE)
+        roles[[keyframe.held for keyframe in keyframes]] = Role.FIXED
+        if not inertial:
+            roles[0] = Role.FIXED
+        elif not (roles == Role.FIXED).any():
+            roles[-1] = Role.GAUGE
+        return roles
+
     def _holding(self, free: list[int]) -> list[int]:
         """Older keyframes that share the most points with the free ones, in order of time.
         The one just before the window is always among them: inertial motion starts there."""
@@ -152,93 +153,33 @@ class MapAdjuster:
     def _adjust(
         self, chosen: list[int], roles: I64, inertial: bool, settings: Settings
     ) -> F64 | None:
-        moving = [k for k, role in zip(chosen, roles, strict=True) if role != Role.FIXED]
-        seen = self.map.seen_by(moving)
-        # Seen once in here, a point would go along with that view and say nothing.
-        points = seen[self._views(chosen)[seen] >= 2]
-        observations, rows = self._observations(chosen, points)
-        place = {k: n for n, k in enumerate(chosen)}
-        factors = [
-            InertialFactor(place[k - 1], place[k], motion if inertial else motion.turn_only())
-            for k, motion in sorted(self.motions.items())
-            if (inertial or self.turns) and k in place and k - 1 in place
-        ]
-        result = adjust(
-            self._states(chosen),
-            roles,
-            self.map.positions[points],
-            observations,
-            factors,
-            self.camera,
-            self.T_rig_camera,
-            settings,
-        )
-        self._apply(chosen, points, rows, result, inertial)
-        everywhere = self._views(range(len(self.map.keyframes)))
-        self.map.drop(seen[everywhere[seen] < 2])
-        return result.covariance
-
-    def _views(self, keyframes: Iterable[int]) -> I64:
-        """(P,) how many of the keyframes saw each point."""
-        views = np.zeros(len(self.map), np.int64)
-        for k in keyframes:
-            views[self.map.keyframes[k].ids] += 1
-        return views
-
-    def _states(self, chosen: list[int]) -> States:
-        states = [self.map.keyframes[k].state for k in chosen]
-        return States(
-            rotations=np.array([s.rotation for s in states]),
-            positions=np.array([s.position for s in states]),
-            velocities=np.array([s.velocity for s in states]),
-            gyro_biases=np.array([s.gyro_bias for s in states]),
-            accelerometer_biases=np.array([s.accelerometer_bias for s in states]),
-            still=np.array([self.map.keyframes[k].still for k in chosen]),
-        )
-
-    def _observations(self, chosen: list[int], points: I64) -> tuple[Observations, list[I64]]:
-        """All sightings of the points, and which rows of each keyframe they are."""
-        row_of = np.full(len(self.map), -1)
-        row_of[points] = np.arange(len(points))
-        keyframes = [self.map.keyframes[k] for k in chosen]
-        rows = [np.flatnonzero(row_of[keyframe.ids] >= 0) for keyframe in keyframes]
-        pairs = list(zip(keyframes, rows, strict=True))
-        inverse_depths = np.concatenate([k.inverse_depths[r] for k, r in pairs])
-        return Observations(
-            keyframes=np.repeat(np.arange(len(chosen)), [len(r) for r in rows]),
-            points=np.concatenate([row_of[k.ids[r]] for k, r in pairs]),
-            pixels=np.concatenate([k.pixels[r] for k, r in pairs]),
-            sigmas_px=np.full(len(inverse_depths), self.parameters.corner_sigma_px),
-            inverse_depths=inverse_depths,
-            inverse_depth_sigmas=np.full(len(inverse_depths), self.inverse_depth_sigma),
-        ), rows
-
-    def _apply(
-        self,
-        chosen: list[int],
-        points: I64,
-        rows: list[I64],
-        result: Adjustment,
-        inertial: bool,
-    ) -> None:
-        """Take over the result and drop the observations that do not fit it."""
+        problem = self._problem(chosen, roles, inertial)
+        result = adjust(*problem.parts(), self.camera, self.T_rig_camera, settings)
         states = result.states
-        for n, k in enumerate(chosen):
-            before = self.map.keyframes[k].state
-            self.map.keyframes[k].state = RigState(
+        for n, keyframe in enumerate(problem.keyframes):
+            before = keyframe.state
+            keyframe.state = RigState(
                 states.rotations[n],
                 states.positions[n],
                 states.velocities[n] if inertial else before.velocity,
                 states.gyro_biases[n],
                 states.accelerometer_biases[n] if inertial else before.accelerometer_bias,
             )
-        self.map.positions[points] = result.points
-        limit = MAX_RESIDUAL_SIGMAS * self.parameters.corner_sigma_px
-        # Written so that NaN, a point behind the camera, counts as wrong.
-        wrong = ~(result.residuals_px < limit)
-        bounds = np.cumsum([0] + [len(r) for r in rows])
-        for n, k in enumerate(chosen):
-            keyframe = self.map.keyframes[k]
-            bad = np.zeros(len(keyframe.ids), bool)
-            bad[rows[n]] = wrong[bounds[n] : bounds[n + 1]]
-            keyframe.forget(bad)
+        self.map.positions[problem.points] = result.points
+        problem.drop_misfits(self.map, result.residuals_px, self.parameters.corner_sigma_px)
+        return result.covariance
+
+    def _problem(self, chosen: list[int], roles: I64, inertial: bool) -> MapProblem:
+        moving = [k for k, role in zip(chosen, roles, strict=True) if role != Role.FIXED]
+        motions = self.motions if inertial or self.turns else {}
+        if not inertial:
+            motions = {k: motion.turn_only() for k, motion in motions.items()}
+        return MapProblem.of(
+            self.map,
+            chosen,
+            roles,
+            self.map.seen_by(moving),
+            motions,
+            self.parameters,
+            self.inverse_depth_sigma,
+        )

@@ -8,6 +8,16 @@ from airground.slam.bundle_adjustment.problem import (
     Settings,
     States,
 )
-from airground.slam.bundle_adjustment.solver import adjust
+from airground.slam.bundle_adjustment.solver import Pieces, adjust, adjusting
 
-__all__ = ["Adjustment", "InertialFactor", "Observations", "Role", "Settings", "States", "adjust"]
+__all__ = [
+    "Adjustment",
+    "InertialFactor",
+    "Observations",
+    "Pieces",
+    "Role",
+    "Settings",
+    "States",
+    "adjust",
+    "adjusting",
+]

@@ -118,6 +118,7 @@ class Settings:
             that no inertial motion leads to; None for no prior.
         accelerometer_bias_prior_sigma: Like `gyro_bias_prior_sigma`, of the accelerometer [m/s^2].
         still_sigma: Standard deviation of the velocity of a robot at rest [m/s].
+        covariance: Whether that of the last free keyframe is wanted: it takes as long as a step.
     """
 
     iterations: int = 8
@@ -126,6 +127,7 @@ class Settings:
     gyro_bias_prior_sigma: float | None = 0.05
     accelerometer_bias_prior_sigma: float | None = 0.3
     still_sigma: float = 0.005
+    covariance: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +143,7 @@ class Adjustment:
         iterations: Steps tried.
         covariance: (6, 6) covariance of the last FREE keyframe's pose: position [m], rotation
             vector of estimate times inverse truth [rad], in the map's axes. None where there
-            is no such keyframe or the problem does not determine it.
+            is no such keyframe, it is not wanted, or the problem does not determine it.
     """
 
     states: States

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
+from typing import TypeVar
 
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dpotrs
@@ -38,6 +39,20 @@ OPEN = 1e7
 """Ratio of a variance to that with all other unknowns known, above which the unknown counts as
 undetermined, such as the scale of a map without IMU and depth."""
 
+T = TypeVar("T")
+Pieces = Generator[None, None, T]
+"""Work that pauses after each piece, and its result."""
+
+
+def completed(pieces: Pieces[T]) -> T:
+    """The result of work, all pieces done at once."""
+    while True:
+        try:
+            next(pieces)
+        except StopIteration as finished:
+            result: T = finished.value
+            return result
+
 
 def adjust(
     states: States,
@@ -65,11 +80,31 @@ def adjust(
     Raises:
         ValueError: The parts of the problem do not fit together, or are not finite.
     """
+    parts = states, roles, points, observations, inertial, camera, T_rig_camera, settings
+    return completed(adjusting(*parts))
+
+
+def adjusting(
+    states: States,
+    roles: I64,
+    points: F64,
+    observations: Observations,
+    inertial: Sequence[InertialFactor],
+    camera: PinholeCamera,
+    T_rig_camera: SE3,
+    settings: Settings,
+) -> Pieces[Adjustment]:
+    """`adjust` in pieces, each of which takes a part of a step or less: the arguments are read
+    before the first pause, and the result is the same to the last bit."""
     roles = np.asarray(roles, np.int64).reshape(len(states))
     model, start = prepare(
         states, roles, points, observations, inertial, camera, T_rig_camera, settings
     )
-    best, linear, cost_before, iterations = _descend(model, start, settings)
+    yield
+    best, linear, cost_before, iterations = yield from _descend(model, start, settings)
+    covariance = None
+    if settings.covariance:
+        covariance = yield from _last_covariance(model, linear, model.slots[roles == Role.FREE])
     return Adjustment(
         _states(best, states),
         best.points,
@@ -77,7 +112,7 @@ def adjust(
         cost_before,
         linear.cost,
         iterations,
-        _last_covariance(model, linear, model.slots[roles == Role.FREE]),
+        covariance,
     )
 
 
@@ -114,15 +149,19 @@ def prepare(
 
 def _descend(
     model: Model, start: Estimate, settings: Settings
-) -> tuple[Estimate, Linearization, float, int]:
+) -> Pieces[tuple[Estimate, Linearization, float, int]]:
     """Levenberg-Marquardt with damping in proportion to the diagonal."""
     best, linear = start, model.linearize(start)
+    yield
     cost_before = linear.cost
     damping = FIRST_DAMPING
     tried = 0
     while tried < settings.iterations and damping <= MOST_DAMPING:
         tried += 1
-        step = solve(model.normal_equations(linear, damping), damping)
+        equations = model.normal_equations(linear, damping)
+        yield
+        step = yield from _solving(equations, damping)
+        yield
         if step is None:
             damping *= DAMPING_FACTOR
             continue
@@ -143,7 +182,11 @@ def _descend(
 
 def solve(equations: NormalEquations, damping: float) -> F64 | None:
     """(N,) step of the keyframes; None where the matrix is not positive definite."""
-    reduced = _reduce(equations, damping)
+    return completed(_solving(equations, damping))
+
+
+def _solving(equations: NormalEquations, damping: float) -> Pieces[F64 | None]:
+    reduced = yield from _reducing(equations, damping)
     if reduced is None:
         return None
     lower, toward, spread, offset = reduced
@@ -151,7 +194,9 @@ def solve(equations: NormalEquations, damping: float) -> F64 | None:
     return np.concatenate([poses, -(offset + spread @ poses).ravel()])
 
 
-def _reduce(equations: NormalEquations, damping: float) -> tuple[F64, F64, F64, F64] | None:
+def _reducing(
+    equations: NormalEquations, damping: float
+) -> Pieces[tuple[F64, F64, F64, F64] | None]:
     """Cholesky factor and gradient of the poses alone, Z and z of `eliminate_chain`; None where not
     positive definite. Overwrites the equations."""
     poses, chain = equations.poses, equations.chain
@@ -172,6 +217,7 @@ def _reduce(equations: NormalEquations, damping: float) -> tuple[F64, F64, F64, 
         )
     except np.linalg.LinAlgError:
         return None
+    yield
     if not width:
         return poses, toward, spread, offset
     # The upper triangle by rows is LAPACK's lower triangle by columns.
@@ -183,14 +229,16 @@ def _back(lower: F64, right: F64) -> F64:
     return dpotrs(lower, right, lower=1)[0] if len(right) else right
 
 
-def _last_covariance(model: Model, linear: Linearization, free_slots: I64) -> F64 | None:
+def _last_covariance(
+    model: Model, linear: Linearization, free_slots: I64
+) -> Pieces[F64 | None]:
     """(6, 6) of position and rotation of the last free keyframe."""
     if not len(free_slots):
         return None
     equations = model.normal_equations(linear, 0.0)
     unknowns = 6 * int(free_slots[-1]) + np.array([3, 4, 5, 0, 1, 2])
     alone = equations.diagonal[unknowns]
-    reduced = _reduce(equations, 0.0)
+    reduced = yield from _reducing(equations, 0.0)
     if reduced is None:
         return None
     units = np.zeros((6 * model.moving, 6))
