@@ -6,7 +6,9 @@ then an image becomes a keyframe and extends the map. How a map begins is in `st
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -23,7 +25,6 @@ from airground.slam.frame_pose import frame_pose, with_shared_errors
 from airground.slam.front_end import TrackedCorners
 from airground.slam.geometry.pose_estimation import PoseFit
 from airground.slam.image_turn import ImageTurn
-from airground.slam.inertial.alignment import InertialAlignment
 from airground.slam.inertial.stationarity import Rest
 from airground.slam.keyframe_choice import KeyframeChoice
 from airground.slam.local_mapping import LocalMapper
@@ -33,6 +34,7 @@ from airground.slam.motion_model import MotionModel, Prediction
 from airground.slam.recovery import Recovery
 from airground.slam.rig_state import RigState
 from airground.slam.sparse_map import SparseMap
+from airground.slam.spread_adjustment import WholeMap
 from airground.slam.starts import REST_WINDOW_NS, MovingStart
 from airground.slam.tracked_path import TrackedPath
 
@@ -95,6 +97,7 @@ class KeyframeSlam:
         self.path.clear()
         own = self.camera, self.T_rig_camera, self.parameters
         self.adjuster = MapAdjuster(self.map, *own, self._inverse_depth_sigma)
+        self._whole = WholeMap(self.map, self.adjuster)
         self._mapper = LocalMapper(self.map, self.tracker, self.adjuster, *own, self._max_depth_m)
         self._recovery = Recovery(self.map, *own)
         self._loops = LoopCloser(
@@ -163,7 +166,7 @@ class KeyframeSlam:
             adjusted = self._insert(frame)
             self.moved_from = before if adjusted else None
             return fit, adjusted
-        return fit, False
+        return fit, self._follow(self._whole.go_on)
 
     def note(self, stamp_ns: int) -> None:
         """Remember the newest pose as one of the trajectory."""
@@ -177,11 +180,10 @@ class KeyframeSlam:
         """Every image noted, hung on its keyframe where that is now."""
         return self.path.trajectory(self.map.keyframes)
 
-    def adjust_all(self) -> None:
-        """Adjust the whole map and go on from its newest keyframe."""
-        before, self.moved_from = self.map.keyframes[-1].state.pose(), self.T_map_camera()
-        self.adjuster.adjust_all(self.inertial)
-        self.state = self.state.following(before, self.map.keyframes[-1].state)
+    def adjust_all(self, at_once: bool = True) -> bool:
+        """Adjust the whole map; a large one over the images to come, unless `at_once`. Returns
+        whether it was adjusted."""
+        return self._follow(self._whole.at_once if at_once else self._whole.begin)
 
     def make_upright(self, scale: float, R_new_map: F64) -> None:
         """Scale the map to metres and turn it so that z points up."""
@@ -192,20 +194,13 @@ class KeyframeSlam:
         """Scale and turn the map about its origin, or so that its newest camera ends in a place."""
         lever = self.T_rig_camera.translation
         self.path.scale(scale, lever)
+        self._whole.begin_anew()
         self.map.move(scale, R_new_map, lever)
         self.state = self.state.scaled(scale, R_new_map, lever)
         if place is not None:
             by = place - self.T_map_camera().translation
             self.map.shift(by)
             self.state = self.state.shifted(by)
-
-    def make_inertial(self, alignment: InertialAlignment) -> None:
-        """Make the map metric and upright; from now on the accelerometer counts."""
-        self.make_upright(alignment.scale, alignment.R_map_v)
-        self.map.set_motion(alignment)
-        self.state = self.map.keyframes[-1].state
-        self.inertial = True
-        self.adjust_all()
 
     def stand_still(self, frame: Frame, rest: Rest) -> None:
         """The robot stood still up to the newest image: from now on the accelerometer counts."""
@@ -241,9 +236,8 @@ class KeyframeSlam:
 
     def depth_range(self) -> tuple[float, float] | None:
         """Nearest and farthest map point in the newest image [m]."""
-        return self.map.depth_range(
-            self.tracker.ids, self.T_map_camera(), self.parameters.min_points
-        )
+        least = self.parameters.min_points
+        return self.map.depth_range(self.tracker.ids, self.T_map_camera(), least)
 
     def _predict(self, frame: Frame, turn: F64) -> Prediction:
         assert self.stamp_ns is not None
@@ -336,15 +330,21 @@ class KeyframeSlam:
             adjusted = replace(adjusted, velocity=self.state.velocity)
         self.state = adjusted
         self._recovery.add_keyframe()
-        before = adjusted.pose()
-        closed = not self._mapper.found_old and self._loops.close(frame.depth, self.inertial)
+        close = partial(self._loops.close, frame.depth)
+        closed = not self._mapper.found_old and self._follow(close)
         if closed:
-            self.state = self.state.following(before, self.map.keyframes[-1].state)
+            self._whole.drop()
         # Until scale and vertical are known, they are sought by all keyframes.
         if self.settled:
             self._culler.cull(self.inertial)
         self.motion.forget_before(self.map.keyframes[-1].stamp_ns)
-        if not self.adjuster.all_due():
-            return closed
-        self.adjust_all()
-        return True
+        return (self.adjuster.all_due() and self.adjust_all(at_once=False)) or closed
+
+    def _follow(self, adjust: Callable[[bool], bool]) -> bool:
+        """Go on from the newest keyframe if the whole map is adjusted; returns whether it was."""
+        before, here = self.map.keyframes[-1].state.pose(), self.T_map_camera()
+        adjusted = adjust(self.inertial)
+        if adjusted:
+            self.moved_from = here
+            self.state = self.state.following(before, self.map.keyframes[-1].state)
+        return adjusted

@@ -123,6 +123,10 @@ class SparseMap:
         result: Mask = self.states[ids] == MAPPED
         return result
 
+    def in_map(self) -> I64:
+        """Numbers of all points in the map."""
+        return np.flatnonzero(self.states[: self._count] == MAPPED)
+
     def drop(self, ids: I64) -> None:
         """Take points out for good."""
         self.states[ids] = DROPPED

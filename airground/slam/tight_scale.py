@@ -98,16 +98,24 @@ class TightScale:
             return self._correct(alignment)
         if not alignment.scale_sigma < METRIC_SIGMA:
             return False
-        slam.make_inertial(alignment)
+        self._make_inertial(alignment)
         return True
+
+    def _make_inertial(self, alignment: InertialAlignment) -> None:
+        """Make the map metric and upright; from now on the accelerometer counts."""
+        slam = self._slam
+        slam.make_upright(alignment.scale, alignment.R_map_v)
+        slam.map.set_motion(alignment)
+        slam.state = slam.map.keyframes[-1].state
+        slam.inertial = True
+        slam.adjust_all()
 
     def _correct(self, alignment: InertialAlignment) -> bool:
         """Adjust the whole map where its scale is off by more than chance: the window that follows
         the robot keeps the scale of the keyframes that hold it. Returns whether it was."""
         if not abs(np.log(alignment.scale)) > alignment.scale_sigma:
             return False
-        self._slam.adjust_all()
-        return True
+        return self._slam.adjust_all(at_once=False)
 
     def _learn(self, alignment: InertialAlignment) -> None:
         """Take over how well scale and vertical are known."""

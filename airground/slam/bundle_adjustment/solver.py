@@ -229,9 +229,7 @@ def _back(lower: F64, right: F64) -> F64:
     return dpotrs(lower, right, lower=1)[0] if len(right) else right
 
 
-def _last_covariance(
-    model: Model, linear: Linearization, free_slots: I64
-) -> Pieces[F64 | None]:
+def _last_covariance(model: Model, linear: Linearization, free_slots: I64) -> Pieces[F64 | None]:
     """(6, 6) of position and rotation of the last free keyframe."""
     if not len(free_slots):
         return None
