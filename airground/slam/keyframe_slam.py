@@ -181,9 +181,9 @@ class KeyframeSlam:
         return self.path.trajectory(self.map.keyframes)
 
     def adjust_all(self, at_once: bool = True) -> bool:
-        """Adjust the whole map; a large one over the images to come, unless `at_once`. Returns
-        whether it was adjusted."""
-        return self._follow(self._whole.at_once if at_once else self._whole.begin)
+        """Adjust the whole map, `at_once` or as `WholeMap.begin`; returns whether it was adjusted."""
+        spread = self.settled and not at_once
+        return self._follow(self._whole.begin if spread else self._whole.at_once)
 
     def make_upright(self, scale: float, R_new_map: F64) -> None:
         """Scale the map to metres and turn it so that z points up."""

@@ -44,7 +44,8 @@ class WholeMap:
 
     def begin(self, inertial: bool) -> bool:
         """Adjust a small map at once, and a large one from the next image on, unless that is under
-        way; returns whether it was adjusted."""
+        way; returns whether it was adjusted. Only for maps whose scale and vertical are known: the
+        correction of others is large, and cannot wait."""
         self._due = len(self.map.keyframes) > MOST_AT_ONCE
         return not self._due and self.at_once(inertial)
 

@@ -266,6 +266,8 @@ def engine_with_work(monkeypatch: pytest.MonkeyPatch) -> KeyframeSlam:
     for name, value in vars(made).items():
         setattr(slam.map, name, value)
     slam.state = slam.map.keyframes[-1].state
+    assert slam.adjust_all(at_once=False), "until scale and vertical are known nothing waits"
+    slam.settled, slam.moved_from = True, None
     assert not slam.adjust_all(at_once=False)
     assert not slam._whole.go_on(False)
     assert slam._whole._work is not None
