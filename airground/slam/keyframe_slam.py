@@ -181,7 +181,7 @@ class KeyframeSlam:
         return self.path.trajectory(self.map.keyframes)
 
     def adjust_all(self, at_once: bool = True) -> bool:
-        """Adjust the whole map, `at_once` or as `WholeMap.begin`; returns whether it was adjusted."""
+        """Adjust the whole map, `at_once` or as `WholeMap.begin`; returns whether it was."""
         spread = self.settled and not at_once
         return self._follow(self._whole.begin if spread else self._whole.at_once)
 
