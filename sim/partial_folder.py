@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
 import os
 import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+from airground.core.scratch_folder import locked, remove_abandoned
 
 SUFFIX = ".partial"
 
@@ -25,10 +25,10 @@ def partial_folder(path: Path) -> Iterator[Path]:
         OSError: No folder can be made there.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    _remove_abandoned(path)
+    remove_abandoned(path.parent, f".{_escaped(path.name)}.*{SUFFIX}")
     folder = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
     folder.chmod(0o777 & ~_umask())
-    with _locked(folder):
+    with locked(folder):
         # Locked before it has the name by which others look for abandoned ones.
         named = folder.rename(folder.with_name(folder.name + SUFFIX))
         try:
@@ -37,26 +37,9 @@ def partial_folder(path: Path) -> Iterator[Path]:
             shutil.rmtree(named, ignore_errors=True)
 
 
-def _remove_abandoned(path: Path) -> None:
-    for folder in path.parent.glob(f".{_escaped(path.name)}.*{SUFFIX}"):
-        with contextlib.suppress(OSError), _locked(folder):
-            shutil.rmtree(folder, ignore_errors=True)
-
-
 def _escaped(name: str) -> str:
     """A name in which `glob` sees no pattern."""
     return "".join(f"[{letter}]" if letter in "*?[" else letter for letter in name)
-
-
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Hold a folder's lock, which ends with the process; OSError if another process has it."""
-    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        yield
-    finally:
-        os.close(descriptor)
 
 
 def _umask() -> int:

@@ -6,9 +6,11 @@ filling the memory. If one side dies, the other one only receives nothing more."
 from __future__ import annotations
 
 import contextlib
-import tempfile
+from pathlib import Path
 
 import zmq
+
+from airground.core.scratch_folder import ScratchFolder
 
 SOCKET = "link"
 """File name of the socket."""
@@ -63,7 +65,7 @@ class Receiver:
         self._socket.set_hwm(0)
         self._socket.setsockopt(zmq.LINGER, 0)
         self._folder = _private_folder()
-        self.address = f"ipc://{self._folder.name}/{SOCKET}"
+        self.address = f"ipc://{self._folder.path}/{SOCKET}"
         self._socket.bind(self.address)
 
     def wait(self, timeout_s: float) -> bool:
@@ -84,13 +86,13 @@ class Receiver:
     def close(self) -> None:
         """Close the socket and remove its folder."""
         self._socket.close()
-        self._folder.cleanup()
+        self._folder.close()
 
 
-def _private_folder() -> tempfile.TemporaryDirectory[str]:
+def _private_folder() -> ScratchFolder:
     """A new folder of mode 0700, whose name is short enough for the name of a socket."""
-    folder = tempfile.TemporaryDirectory(prefix="airground-")
-    if len(f"{folder.name}/{SOCKET}".encode()) <= zmq.IPC_PATH_MAX_LEN:
+    folder = ScratchFolder()
+    if len(f"{folder.path}/{SOCKET}".encode()) <= zmq.IPC_PATH_MAX_LEN:
         return folder
-    folder.cleanup()
-    return tempfile.TemporaryDirectory(prefix="airground-", dir="/tmp")
+    folder.close()
+    return ScratchFolder(Path("/tmp"))

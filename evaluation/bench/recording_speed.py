@@ -5,10 +5,9 @@ from __future__ import annotations
 import resource
 import subprocess
 import sys
-import tempfile
 import time
-from pathlib import Path
 
+from airground.core.scratch_folder import ScratchFolder
 from airground.errors import AirgroundError
 from airground.io.recording import Recording
 from evaluation.bench.report import RecordingSpeed
@@ -28,8 +27,8 @@ def record_anew(
     Raises:
         AirgroundError: It could not be made.
     """
-    with tempfile.TemporaryDirectory(prefix="airground-bench-") as folder:
-        out = Path(folder) / scene
+    with ScratchFolder() as folder:
+        out = folder.path / scene
         options = ["--sensors", RECORDED[name], "--duration-s", f"{duration_s:g}"]
         options += ["--threads", str(threads), "--out", str(out)]
         command = [sys.executable, "-c", _COMMAND, "simulate", scene, *options]

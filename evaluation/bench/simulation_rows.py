@@ -6,17 +6,16 @@ The images are those of a flight over `SCENE` with nominal sensors, whatever rec
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
 from itertools import cycle
-from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from airground.core.scratch_folder import ScratchFolder
 from airground.io.png_encoder import encode_png
 from evaluation.bench.material import Material
 from evaluation.bench.work import Work
@@ -63,9 +62,9 @@ class Simulated:
 def simulated() -> Simulated:
     """The flight, made once in a process; only the world's file is needed, and that is read."""
     draw_with(len(os.sched_getaffinity(0)))
-    with tempfile.TemporaryDirectory(prefix="airground-bench-") as folder:
+    with ScratchFolder() as folder:
         flight = Flight(load_scene(SCENE), SEED, 0, NOMINAL, DURATION_S)
-        _, plan, plain = write_all_but_images(Path(folder), flight)
+        _, plan, plain = write_all_but_images(folder.path, flight)
         plan = with_models(plan, plain)
         return Simulated(plan, FrameMaker(plan))
 

@@ -6,11 +6,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, create_mutex_group
 
+from airground.core.scratch_folder import ScratchFolder
 from airground.errors import AirgroundError, InputError
 from evaluation.commands.options import OutOption, Shown, Verb
 from evaluation.commands.results import ACCEPTED
@@ -93,8 +93,8 @@ def together(files: Sequence[Path]) -> Iterator[Path]:
 
     named = [file.parent if file.name == RUN_FILE else file for file in files]
     first, second = map(RunFile.open, files, distinct_names(named))
-    with TemporaryDirectory(prefix="airground-view-") as folder:
-        both = Path(folder) / "two_runs.rrd"
+    with ScratchFolder() as folder:
+        both = folder.path / "two_runs.rrd"
         with step("comparing the runs"):
             helds = hold_files(first, second, ACCEPTED)
             write_both(first, second, helds, both)

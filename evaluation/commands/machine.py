@@ -51,10 +51,9 @@ class Bench(SensorOption, SeedOption, Verb):
     """print the figures as JSON, and nothing else, on stdout"""
 
     def main(self) -> None:
-        import tempfile
-
         from rich.console import Console
 
+        from airground.core.scratch_folder import ScratchFolder
         from evaluation.bench.publish import print_table
         from evaluation.bench.rows import RECORDED, checked_names
         from evaluation.bench.run import run_benchmark
@@ -74,13 +73,13 @@ class Bench(SensorOption, SeedOption, Verb):
         cores = "1 core" if self.workers() == 1 else f"1 and {self.workers()} cores"
         announce(f"times {len(names)} rows on {cores}", expected_s)
         with (
-            tempfile.TemporaryDirectory(prefix="airground-bench-") as scratch,
+            ScratchFolder() as scratch,
             step("benchmark", parts, "parts") as benchmark,
         ):
             path = self.recording
             if path is None:
                 benchmark.say(f"recording {SCENE}")
-                path = self._record(Path(scratch) / SCENE)
+                path = self._record(scratch.path / SCENE)
             report = run_benchmark(
                 path, names, self.workers(), seconds, self.curves, benchmark.next
             )

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
+from airground.core.scratch_folder import ScratchFolder
 from airground.errors import AirgroundError, InputError
 from evaluation.datasets.datasheet import datasheet
 from evaluation.datasets.plan import PLAN, Plan, World
@@ -46,8 +46,8 @@ def make_dataset(plan: Plan, out: Path, jobs: int, threads: int) -> None:
         tasks = [_Making(world, plan, unfinished, each) for world in missing]
         done = len(plan.worlds) - len(missing)
         with (
-            TemporaryDirectory() as scratch,
-            Crew(None, jobs, len(tasks), Path(scratch)) as crew,
+            ScratchFolder() as scratch,
+            Crew(None, jobs, len(tasks), scratch.path) as crew,
             step("recording", len(plan.worlds), "worlds", done) as recording,
         ):
             for _, refusal in crew.outcomes(_make, tasks):

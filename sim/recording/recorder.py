@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-import tempfile
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.messages import ImuSamples, MagneticSamples
+from airground.core.scratch_folder import ScratchFolder
 from airground.errors import AirgroundError, InputError
 from airground.io import recording_writer
 from airground.io.header import FrameCounts, Header
@@ -138,10 +138,10 @@ def rendered(flight: Flight, workers: int) -> Iterator[Recording]:
         AirgroundError: One line on what was wrong.
     """
     with (
-        tempfile.TemporaryDirectory(prefix="airground-") as folder,
+        ScratchFolder() as folder,
         FrameWorkers(workers) as pool,
     ):
-        root = Path(folder)
+        root = folder.path
         try:
             header, plan, plain = write_all_but_images(root, flight)
             recording_writer.finish(root, header, {})
@@ -152,7 +152,7 @@ def rendered(flight: Flight, workers: int) -> Iterator[Recording]:
         images = _DrawnImages(
             FrameServer(plan, pool), ground.depth.units_per_m, ground.registration()
         )
-        yield Recording.open(folder, images)
+        yield Recording.open(root, images)
 
 
 @dataclass(frozen=True)

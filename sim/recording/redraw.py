@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
+from airground.core.scratch_folder import ScratchFolder
 from airground.errors import AirgroundError, InputError
 from airground.io.layout import TRUTH
 from airground.io.recording import Recording
@@ -40,8 +39,8 @@ def redrawn(recording: Recording, flight: Flight, robots: Sequence[Robot]) -> It
         InputError: The flight does not give this recording.
         AirgroundError: The folder for temporary files cannot hold the worlds.
     """
-    with tempfile.TemporaryDirectory(prefix="airground-") as folder:
-        root = Path(folder)
+    with ScratchFolder() as folder:
+        root = folder.path
         try:
             header, plan, plain = write_all_but_images(root, flight)
             stated = recording.header

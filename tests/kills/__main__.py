@@ -67,7 +67,7 @@ def kill_often(verb: str, words: tuple[str, ...], folder: Path, count: int, seed
             shutil.rmtree(victim.output(), ignore_errors=True)
     victim.finish()
     beside = {path.name for path in victim.folder.iterdir()} - {"tmp", "stderr", victim.out}
-    faults += [f"{one} stays after a whole run" for one in beside]
+    faults += [f"{one} stays after a whole run" for one in beside | victim.temporary()]
     same = digest(victim.output(), SAME[verb]) == expected
     faults += [] if same else ["the bytes differ from a run without kills"]
     said = ", ".join(f"{kind.replace('_', ' ')} {n}" for kind, n in left.items() if n) or "nothing"
