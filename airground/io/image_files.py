@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Protocol
+from typing import Protocol, overload
 
 from airground.core.arrays import F32, U8
 from airground.core.camera import PinholeCamera
@@ -28,6 +28,27 @@ class ImageSource(Protocol):
 
 
 @dataclass(frozen=True)
+class ListedFiles(Sequence[Path]):
+    """Files below `folder` by their `names` in a list. Each path is made when it is asked for: as
+    objects, those of an hour's images take 100 MB, and each that was opened takes more."""
+
+    folder: Path
+    names: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @overload
+    def __getitem__(self, index: int) -> Path: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Path]: ...
+    def __getitem__(self, index: int | slice) -> Path | list[Path]:
+        if isinstance(index, slice):
+            return [self.folder / name for name in self.names[index]]
+        return self.folder / self.names[index]
+
+
+@dataclass(frozen=True)
 class ImageFiles:
     """Images on disk, each read when it is needed.
 
@@ -38,9 +59,9 @@ class ImageFiles:
         registration: Moves depth to the colour camera's pixels; None where the files hold it so.
     """
 
-    mav_files: tuple[Path, ...]
-    ground_colour_files: tuple[Path, ...]
-    ground_depth_files: tuple[Path, ...]
+    mav_files: Sequence[Path]
+    ground_colour_files: Sequence[Path]
+    ground_depth_files: Sequence[Path]
     mav_camera: PinholeCamera
     ground_camera: PinholeCamera
     depth_units_per_m: float
@@ -85,16 +106,15 @@ def _listing(folder: Path) -> list[Path]:
         raise RecordingError(f"{folder}: cannot be listed: {error.strerror}") from None
 
 
-def listed_files(folder: Path, names: Iterable[str], list_path: Path) -> list[Path]:
+def listed_files(folder: Path, names: Iterable[str], list_path: Path) -> ListedFiles:
     """The files below `folder` that the list at `list_path` names.
     RecordingError if a name leads out of the folder."""
-    files = []
-    for name in names:
+    kept = tuple(names)
+    for name in kept:
         path = PurePosixPath(name)
         if path.is_absolute() or ".." in path.parts or "\0" in name:
             raise RecordingError(
                 f"{list_path}: the file name {name[:60]!r} leads out of the recording; expected "
                 "one below the folder, without '..'"
             )
-        files.append(folder / path)
-    return files
+    return ListedFiles(folder, kept)

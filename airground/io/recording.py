@@ -65,9 +65,9 @@ class Recording(Pair):
         mav, ground = header.calibration.mav, header.calibration.ground
         if images is None:
             images = ImageFiles(
-                mav_files=tuple(listed_files(path / layout.MAV_IMAGES, mav_names, mav_list)),
-                ground_colour_files=tuple(listed_files(path / "ground", colour_names, ground_list)),
-                ground_depth_files=tuple(listed_files(path / "ground", depth_names, ground_list)),
+                mav_files=listed_files(path / layout.MAV_IMAGES, mav_names, mav_list),
+                ground_colour_files=listed_files(path / "ground", colour_names, ground_list),
+                ground_depth_files=listed_files(path / "ground", depth_names, ground_list),
                 mav_camera=mav.camera.lens().pinhole(),
                 ground_camera=ground.camera.lens().pinhole(),
                 depth_units_per_m=ground.depth.units_per_m,

@@ -51,6 +51,7 @@ class KeyframeCuller:
             self._next = self._next if self._next < left else 1
             if not self._judge(self._next, inertial):
                 self._next += 1
+        self.map.compact()
 
     def _judge(self, keyframe: int, inertial: bool) -> bool:
         """Take a keyframe out if it may go; returns whether it did."""

@@ -65,6 +65,14 @@ class FeatureTracker:
         self.ids, self.pixels = self.ids[kept], self.pixels[kept]
         self.failures = self.failures[kept]
 
+    def held_points(self) -> I64:
+        """As `PointHolder.held_points`."""
+        return self.ids
+
+    def renumber(self, new: I64) -> None:
+        """As `PointHolder.renumber`."""
+        self.ids = new[self.ids]
+
     def judge(self, ids: I64, fits: Mask, patience: int) -> None:
         """Note which points fitted the pose; give up those that failed `patience` times."""
         where = np.isin(self.ids, ids)

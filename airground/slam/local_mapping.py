@@ -49,6 +49,9 @@ class LocalMapper:
     max_depth_m: float = np.inf
     found_old: bool = field(default=False, init=False)
 
+    def __post_init__(self) -> None:
+        self.map.holders.append(self.tracker)
+
     def insert(
         self,
         frame: Frame,

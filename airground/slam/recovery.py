@@ -51,6 +51,9 @@ class Recovery:
     parameters: KeyframeSlam
     _index: KeyframeIndex = field(default_factory=KeyframeIndex, init=False)
 
+    def __post_init__(self) -> None:
+        self.map.holders.append(self._index)
+
     def add_keyframe(self) -> None:
         """Make the newest keyframe known."""
         keyframe = self.map.keyframes[-1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -70,10 +71,22 @@ def camera_poses(keyframes: Sequence[Keyframe], T_rig_camera: SE3) -> tuple[F64,
     return rotations @ T_rig_camera.rotation, rotations @ T_rig_camera.translation + positions
 
 
+class PointHolder(Protocol):
+    """What holds numbers of points besides keyframes."""
+
+    def held_points(self) -> I64:
+        """(n,) numbers of points, in any order."""
+
+    def renumber(self, new: I64) -> None:
+        """Points have other numbers: by the old one, `new` has that of each point held."""
+
+
 class SparseMap:
     """Keyframes in order of time, and points by their number.
 
     Attributes:
+        holders: What else holds numbers of points.
+        renumbers: Whether points may have other numbers: no work under way holds any.
         keyframes: Keyframes that were not culled.
         culled: Number of culled keyframes.
         positions: (capacity, 3) positions of the points [m]; only those MAPPED count.
@@ -84,15 +97,18 @@ class SparseMap:
 
     def __init__(self) -> None:
         self.keyframes: list[Keyframe] = []
+        self.holders: list[PointHolder] = []
+        self.renumbers = True
         self.culled = 0
         self.positions = np.zeros((FIRST_POINTS, 3))
         self.states = np.zeros(FIRST_POINTS, np.int8)
         self.origins = np.zeros(FIRST_POINTS, np.int64)
         self.first_pixels = np.zeros((FIRST_POINTS, 2))
         self._count = 0
+        self._compact_at = FIRST_POINTS
 
     def __len__(self) -> int:
-        """Points that were ever made."""
+        """Points that have a number."""
         return self._count
 
     @property
@@ -151,6 +167,29 @@ class SparseMap:
         self.drop(waiting)
         mapped = gone.ids[self.mapped(gone.ids)]
         self.drop(mapped[views[mapped] < 2])
+
+    def compact(self) -> None:
+        """Renumber the points, in the same order, without those that nothing holds any more.
+
+        Does so once points have doubled in number: most are dropped or go with their keyframes,
+        so that in a bounded area the memory stays bounded. What follows does not change by it.
+        """
+        if not self.renumbers or self._count < self._compact_at:
+            return
+        seen = [keyframe.ids for keyframe in self.keyframes]
+        held = np.unique(np.concatenate([*seen, *(one.held_points() for one in self.holders)]))
+        new = np.full(self._count, -1)
+        new[held] = np.arange(len(held))
+        for name in ("positions", "states", "origins", "first_pixels"):
+            array = getattr(self, name)
+            array[: len(held)] = array[held]
+            array[len(held) :] = 0
+        for keyframe in self.keyframes:
+            keyframe.ids = new[keyframe.ids]
+        for holder in self.holders:
+            holder.renumber(new)
+        self._count = len(held)
+        self._compact_at = max(FIRST_POINTS, 2 * self._count)
 
     def seen_by(self, keyframes: list[int]) -> I64:
         """Numbers of all points in the map that one of the keyframes saw, sorted."""

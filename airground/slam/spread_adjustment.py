@@ -55,6 +55,7 @@ class WholeMap:
             return False
         if self._work is None:
             self._work = SpreadAdjustment(self.map, self.adjuster, inertial)
+            self.map.renumbers = False
         elif self._work.go_on():
             self.drop()
             return True
@@ -62,11 +63,13 @@ class WholeMap:
 
     def drop(self) -> None:
         """The whole map was adjusted otherwise: nothing is to be done."""
-        self._due, self._work = False, None
+        self._due = False
+        self.begin_anew()
 
     def begin_anew(self) -> None:
         """The map was moved: work under way is of no use."""
         self._work = None
+        self.map.renumbers = True
 
 
 class SpreadAdjustment:

@@ -125,7 +125,7 @@ def play(
             return gathering.material(), None
         memory = MemoryLog(recording, tracking.pids)
         driven = drive(recording, tracking, pipeline, setup, [gathering, memory])
-    frame_ms = {name: tracked.front_end.durations_ms for name, tracked in driven.tracked.items()}
+    frame_ms = {name: list(one.front_end.durations_ms) for name, one in driven.tracked.items()}
     peak_mib = None if added.mib is None else added.mib + driven.tracking_memory_mib
     real_time = RealTime(
         threads=threads,

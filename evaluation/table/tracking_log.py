@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 import time
-from collections.abc import Callable, Iterable, Sequence
+from array import array
+from collections.abc import Callable, Iterable, MutableSequence, Sequence
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar, overload
+from typing import IO, Generic, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +16,7 @@ from numpy.typing import NDArray
 from airground.core.messages import GroundImage, ImuSamples, MavImage
 from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
+from airground.errors import AirgroundError
 from airground.slam.front_end import FrontEnd, ScaleEstimate, TrackedPose, Tracking
 
 RECORDS_A_CHUNK = 1024
@@ -37,19 +41,33 @@ _RECORD = np.dtype(
 
 class AnswerLog(Sequence[TrackedPose]):
     """Answers in order of time, without their corners; each is made anew when it is asked for.
-    As objects they take 3.3 kB each, or 120 MB in ten minutes of two robots."""
+
+    An answer takes 420 bytes, or 90 MB in an hour of two robots, and none is needed before the end:
+    full chunks go to a temporary file without a name."""
 
     def __init__(self, answers: Iterable[TrackedPose] = ()) -> None:
-        self._chunks: list[NDArray[np.void]] = []
+        self._newest = np.zeros(RECORDS_A_CHUNK, _RECORD)
+        self._file: IO[bytes] | None = None
+        self._read: tuple[int, NDArray[np.void]] | None = None
         self._count = 0
         for answer in answers:
             self.append(answer)
 
+    def __getstate__(self) -> NDArray[np.void]:
+        chunks = [self._chunk(index) for index in range(self._count // RECORDS_A_CHUNK + 1)]
+        return np.concatenate(chunks)[: self._count]
+
+    def __setstate__(self, records: NDArray[np.void]) -> None:
+        AnswerLog.__init__(self)
+        for start in range(0, len(records), RECORDS_A_CHUNK):
+            some = records[start : start + RECORDS_A_CHUNK]
+            self._newest[: len(some)] = some
+            self._count += len(some)
+            self._put_away()
+
     def append(self, answer: TrackedPose) -> None:
-        at = self._count % RECORDS_A_CHUNK
-        if at == 0:
-            self._chunks.append(np.zeros(RECORDS_A_CHUNK, _RECORD))
-        record = self._chunks[-1][at]
+        """Keep an answer; raises AirgroundError if temporary files have no room."""
+        record = self._newest[self._count % RECORDS_A_CHUNK]
         record["stamp_ns"] = answer.stamp_ns
         record["tracking"] = _STATES.index(answer.tracking)
         record["corrected"] = answer.corrected
@@ -64,6 +82,7 @@ class AnswerLog(Sequence[TrackedPose]):
         if answer.depth_range is not None:
             record["has_depth_range"], record["depth_range"] = True, answer.depth_range
         self._count += 1
+        self._put_away()
 
     def __len__(self) -> int:
         return self._count
@@ -80,8 +99,33 @@ class AnswerLog(Sequence[TrackedPose]):
             raise IndexError(f"answer {index} of {self._count}")
         return self._answer(at)
 
+    def _put_away(self) -> None:
+        """Write the newest chunk if it is full, and begin another one."""
+        if self._count % RECORDS_A_CHUNK or not self._count:
+            return
+        try:
+            if self._file is None:
+                self._file = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115
+            written = self._file.write(self._newest.tobytes())
+        except OSError as error:
+            raise AirgroundError(_no_room(error.strerror)) from None
+        if written != self._newest.nbytes:
+            raise AirgroundError(_no_room("No space left on device"))
+        self._newest = np.zeros(RECORDS_A_CHUNK, _RECORD)
+
+    def _chunk(self, index: int) -> NDArray[np.void]:
+        """A chunk, from memory or from the file; the last one read is kept."""
+        if index == self._count // RECORDS_A_CHUNK:
+            return self._newest
+        if self._read is None or self._read[0] != index:
+            assert self._file is not None
+            size = self._newest.nbytes
+            content = os.pread(self._file.fileno(), size, index * size)
+            self._read = index, np.frombuffer(content, _RECORD)
+        return self._read[1]
+
     def _answer(self, at: int) -> TrackedPose:
-        record = self._chunks[at // RECORDS_A_CHUNK][at % RECORDS_A_CHUNK]
+        record = self._chunk(at // RECORDS_A_CHUNK)[at % RECORDS_A_CHUNK]
         tracking = _STATES[record["tracking"]]
         pose = covariance = scale = depth_range = None
         # Copies: a view would keep its whole chunk alive.
@@ -106,6 +150,14 @@ class AnswerLog(Sequence[TrackedPose]):
         )
 
 
+def _no_room(reason: str | None) -> str:
+    """One line on why answers cannot be kept."""
+    return (
+        f"{tempfile.gettempdir()}: poses cannot be kept in a temporary file: {reason}; set TMPDIR "
+        "to a folder with room"
+    )
+
+
 Image = TypeVar("Image", MavImage, GroundImage)
 
 
@@ -121,7 +173,7 @@ class FrontEndLog:
     """
 
     answers: AnswerLog = field(default_factory=AnswerLog)
-    durations_ms: list[float] = field(default_factory=list)
+    durations_ms: MutableSequence[float] = field(default_factory=lambda: array("d"))
     waiting: str = ""
 
     def stamps_ns(self) -> NDArray[np.int64]:

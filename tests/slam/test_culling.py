@@ -214,3 +214,24 @@ def test_long_ways_keep_their_accuracy_with_fewer_keyframes(
     assert stamps_ns[0] <= given[0]  # back to the first view of the map
     assert len(stamps_ns) >= len(whole.path)
     assert run.error_m < 1.25 * whole.error_m + 1e-3
+
+
+@pytest.mark.slow
+def test_numbers_of_points_change_no_pose(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Renumbered at every keyframe, the map gives the same poses to the last bit."""
+    monkeypatch.setattr(culling, "COVERED_BY", 1)
+    monkeypatch.setattr(culling, "COVERED_SHARE", 0.3)
+    sequence = drive(Leg(0.5), Leg(4.0, speed_mps=0.4, sway=1.0), Leg(2.0))
+    plain = Watched(sequence)
+    compact = SparseMap.compact
+
+    def at_once(sparse_map: SparseMap) -> None:
+        sparse_map._compact_at = 0
+        compact(sparse_map)
+
+    monkeypatch.setattr(SparseMap, "compact", at_once)
+    run = Watched(sequence)
+    assert run.slam.map.culled > 0
+    assert len(run.slam.map) < len(plain.slam.map)
+    np.testing.assert_array_equal(run.path.translations, plain.path.translations)
+    np.testing.assert_array_equal(run.path.rotations, plain.path.rotations)

@@ -171,3 +171,66 @@ def test_candidates_of_a_culled_keyframe_begin_where_they_were_seen_next() -> No
     assert sparse_map.origins[8] == 1
     np.testing.assert_array_equal(sparse_map.first_pixels[8], [8.0, 0.0])
     assert sparse_map.states[9] == DROPPED  # seen by no other keyframe
+
+
+class Numbers:
+    """Numbers of points beside those of keyframes."""
+
+    def __init__(self, ids: list[int]) -> None:
+        self.ids = np.array(ids)
+
+    def held_points(self) -> np.ndarray:
+        return self.ids
+
+    def renumber(self, new: np.ndarray) -> None:
+        self.ids = new[self.ids]
+
+
+def test_points_that_nothing_holds_go_from_memory_and_the_others_keep_their_order() -> None:
+    sparse_map, rng = SparseMap(), np.random.default_rng(3)
+    count = 2 * FIRST_POINTS
+    sparse_map.new_points(rng.uniform(0, 400, (count, 2)), 0)
+    sparse_map.place(np.arange(0, count, 2), rng.normal(size=(count // 2, 3)))
+    seen = [rng.permutation(count)[:700].tolist() for _ in range(3)]
+    sparse_map.keyframes += [keyframe(ids) for ids in seen]
+    sparse_map.drop(np.array(seen[0][:300]))  # a keyframe may hold points that are out
+    other = Numbers([seen[1][5], 4001, 17])
+    sparse_map.holders.append(other)
+    before = [*seen, other.ids]
+    names = ("positions", "states", "origins", "first_pixels")
+    expected = [[getattr(sparse_map, name)[ids] for name in names] for ids in before]
+    sparse_map.compact()
+    after = [*(one.ids for one in sparse_map.keyframes), other.ids]
+    for ids, values in zip(after, expected, strict=True):
+        for name, value in zip(names, values, strict=True):
+            np.testing.assert_array_equal(getattr(sparse_map, name)[ids], value)
+    held = np.unique(np.concatenate(before))
+    assert len(sparse_map) == len(held) < count
+    np.testing.assert_array_equal(
+        np.argsort(np.concatenate(before)), np.argsort(np.concatenate(after))
+    )
+    # What comes next begins as the first points did.
+    assert sparse_map.new_points(np.zeros((1, 2)), 2).tolist() == [len(held)]
+    assert sparse_map.states[len(held)] == CANDIDATE
+    assert len(sparse_map.states) == count
+
+
+def test_memory_is_bounded_by_what_is_held() -> None:
+    sparse_map = SparseMap()
+    for _ in range(200):
+        ids = sparse_map.new_points(np.zeros((500, 2)), 0)
+        sparse_map.keyframes = [keyframe(ids.tolist())]
+        sparse_map.compact()
+    assert len(sparse_map.states) <= 2 * FIRST_POINTS
+
+
+def test_points_keep_their_numbers_while_work_holds_them() -> None:
+    sparse_map = SparseMap()
+    sparse_map.new_points(np.zeros((2 * FIRST_POINTS, 2)), 0)
+    sparse_map.keyframes = [keyframe([5])]
+    sparse_map.renumbers = False
+    sparse_map.compact()
+    assert sparse_map.keyframes[0].ids.tolist() == [5]
+    sparse_map.renumbers = True
+    sparse_map.compact()
+    assert sparse_map.keyframes[0].ids.tolist() == [0]

@@ -29,6 +29,7 @@ MIN_HULL_SHARE = 0.05
 """Inliers must span this share of the image: a small object may have moved, or have a twin."""
 PNP_ROUNDS = 300
 PNP_THRESHOLD_PX = 5.0
+NO_POINTS = np.empty(0, np.int64)
 SIGMA_PX = 1.5
 """A corner found anew lies this far from the one that was followed."""
 
@@ -71,6 +72,14 @@ class KeyframeIndex:
 
     def remove(self, keyframe_id: int) -> None:
         del self._point_ids[keyframe_id], self._descriptors[keyframe_id]
+
+    def held_points(self) -> I64:
+        """(n,) numbers of the points remembered, in any order."""
+        return np.concatenate([NO_POINTS, *self._point_ids.values()])
+
+    def renumber(self, new: I64) -> None:
+        """Points have other numbers: by the old one, `new` has that of each point."""
+        self._point_ids = {keyframe: new[ids] for keyframe, ids in self._point_ids.items()}
 
     def alike(self, query: Described, among: list[int] | None = None) -> list[int]:
         """The keyframes most like an image, best first, among some or (None) all.

@@ -23,6 +23,7 @@ from evaluation.run.driver import drive, pipeline_for
 from evaluation.run.drops import SCHEMA, DropList, Stamps, fingerprint
 from evaluation.run.live.arrivals import Stream, in_order
 from evaluation.run.live.playback import LiveTask, Playback, PlaybackClock, RobotReport, play_robot
+from evaluation.run.live.stamped_times import StampedTimes
 from evaluation.run.onlooker import Seen
 from evaluation.run.recording import RunResult, RunRows
 from evaluation.run.robot_process import RobotProcess, RobotTask
@@ -64,8 +65,8 @@ class LiveLog:
     clock: PlaybackClock
     reports: dict[Source, RobotReport | None] = field(default_factory=dict)
     late_ns: dict[Source, list[int]] = field(default_factory=dict)
-    mapped_ns: dict[Source, dict[int, int]] = field(
-        default_factory=lambda: {robot: {} for robot in Source}
+    mapped_ns: dict[Source, StampedTimes] = field(
+        default_factory=lambda: {robot: StampedTimes() for robot in Source}
     )
     aligned_ms: list[float] = field(default_factory=list)
     processor_s: float = 0.0
@@ -178,7 +179,7 @@ class LiveTracking(AbstractContextManager["LiveTracking"]):
         self._processor_s = time.process_time()
         for frame in in_order(self._streams, clock, patience_s):
             yield frame
-            log.mapped_ns[frame.robot][frame.stamp_ns] = clock.now_ns()
+            log.mapped_ns[frame.robot].note(frame.stamp_ns, clock.now_ns())
 
     def see(self, seen: Seen) -> None:
         """Note the time from a surface's last image to its place in the ground map."""

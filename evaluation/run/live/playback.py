@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Protocol
@@ -18,6 +18,7 @@ from airground.io.recording import Recording
 from airground.link.channel import Sender
 from airground.tracking import RobotTracker, TrackedFrame
 from evaluation.run.live.radio_link import Radio, RadioLimits, Uplink
+from evaluation.run.live.stamped_times import StampedTimes
 from evaluation.run.robot_process import READY, RobotTask, open_tracker
 from evaluation.setup.environment import settle
 from evaluation.setup.memory import peak_memory_mib
@@ -143,7 +144,7 @@ class Played:
         processor_s: Processor time of the playback [s].
     """
 
-    posed_ns: dict[int, int]
+    posed_ns: Mapping[int, int]
     dropped_ns: list[int]
     longest_queue: int
     processor_s: float
@@ -167,7 +168,7 @@ def play(
     stamps_ns = own.camera_stamps.tolist()
     queue = FrameQueue(stamps_ns, capacity)
     bundler = own.bundler()
-    posed_ns = {}
+    posed_ns = StampedTimes()
     started_s = time.process_time()
     while (index := queue.take(clock.now_ns())) is not None:
         image = own.read_image(index)
@@ -177,7 +178,7 @@ def play(
             tracker.add(stamped.message)
         frame = tracker.add(last.message)
         assert frame is not None
-        posed_ns[image.stamp_ns] = clock.now_ns()
+        posed_ns.note(image.stamp_ns, clock.now_ns())
         hand_over(frame)
     return Played(
         posed_ns,

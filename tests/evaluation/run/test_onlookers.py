@@ -73,6 +73,7 @@ def measured(*onlookers: Onlooker) -> RunRows:
     rows = RunRows(RECORDING, TRUTH, setup)
     pipeline = pipeline_for(RECORDING, setup, np.random.default_rng(0))
     drive(RECORDING, Frames(), pipeline, setup, [rows, *onlookers])
+    rows.add_times()
     return rows
 
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import pickle
+import tempfile
+import tracemalloc
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airground.core.se3 import SE3
+from airground.errors import AirgroundError
 from airground.slam.front_end import ScaleEstimate, TrackedCorners, TrackedPose, Tracking
 from evaluation.table.tracking_log import RECORDS_A_CHUNK, AnswerLog
 
@@ -62,10 +66,36 @@ def test_many_answers_keep_their_order_and_little_memory() -> None:
     assert [answer.stamp_ns for answer in log] == list(range(count))
     assert [answer.stamp_ns for answer in log[-3:]] == [count - 3, count - 2, count - 1]
     assert log[-1].stamp_ns == count - 1
-    assert len(pickle.dumps(log)) < 600 * (count + RECORDS_A_CHUNK)
+    assert len(pickle.dumps(log)) < 450 * count
+    sent = pickle.loads(pickle.dumps(log))
+    assert [answer.stamp_ns for answer in sent] == list(range(count))
+    sent.append(log[0])
+    assert (len(sent), len(log)) == (count + 1, count)
+    assert sent[-1].stamp_ns == 0
     for outside in (count, -count - 1):
         with pytest.raises(IndexError, match=f"of {count}"):
             log[outside]
+
+
+def test_memory_does_not_grow_with_the_answers() -> None:
+    answer = TrackedPose(1, Tracking.TRACKED, SE3.identity(), np.eye(6))
+    log = AnswerLog([answer] * RECORDS_A_CHUNK)
+    tracemalloc.start()
+    for _ in range(10 * RECORDS_A_CHUNK):
+        log.append(answer)
+    grown, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert grown < 1.5 * 420 * RECORDS_A_CHUNK
+
+
+def test_no_room_for_temporary_files_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(buffering: int) -> object:
+        return Path("/dev/full").open("wb", buffering=buffering)
+
+    monkeypatch.setattr(tempfile, "TemporaryFile", full)
+    answer = TrackedPose(1, Tracking.LOST, None)
+    with pytest.raises(AirgroundError, match=r"No space left on device; set TMPDIR"):
+        AnswerLog([answer] * RECORDS_A_CHUNK)
 
 
 def test_corners_are_not_kept() -> None:

@@ -44,4 +44,4 @@ def test_an_image_takes_as_long_as_its_clock_says_inertial_samples_included() ->
     watched.add_imu(ImuSamples(np.zeros(0, np.int64), np.zeros((0, 3)), np.zeros((0, 3))))
     for stamp in (5, 6):
         watched.track(MavImage(stamp, np.zeros((4, 4), np.uint8)))
-    assert watched.log().durations_ms == [750.0, 1000.0]
+    assert list(watched.log().durations_ms) == [750.0, 1000.0]
