@@ -1,0 +1,101 @@
+"""A command over a recording, with the memory of all its processes as it goes."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import psutil
+
+from evaluation.setup.memory import resident_mib
+from evaluation.table.rows import LIVE_STAGE, ResultTable
+from tests.sources import ROOT
+
+CLI = "from evaluation.cli import main; main()"
+PROGRESS = re.compile(r"running: (\d+)/(\d+) images")
+"""A line of the command's progress; one comes every ten seconds."""
+ROBOTS = ("mav", "ground")
+
+
+@dataclass(frozen=True)
+class Watched:
+    """Outcome of a command.
+
+    Attributes:
+        code: Exit code.
+        memory: Recorded time that had passed [s], and memory then, shared pages once [MiB].
+        said: The end of what it printed.
+    """
+
+    code: int
+    memory: list[tuple[float, float]]
+    said: str
+
+    def held_mib(self, at_s: float) -> float | None:
+        """Memory once so much was tracked; None if it was not read after that."""
+        return next((mib for time_s, mib in self.memory if time_s >= at_s), None)
+
+    def growth_mib(self, since_s: float) -> float | None:
+        """The most memory after a time, beyond that at the time; None before it has come."""
+        later = [mib for time_s, mib in self.memory if time_s >= since_s]
+        return max(later) - later[0] if len(later) > 1 else None
+
+
+def watch(words: list[str], duration_s: float) -> Watched:
+    """Run `airground WORDS` over a recording of this length, to its end."""
+    command = [sys.executable, "-c", CLI, *words]
+    memory, said = [], []
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=ROOT
+    ) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            said.append(line)
+            match = PROGRESS.match(line)
+            if match is None:
+                continue
+            mib = resident_mib(_processes(process.pid))
+            if mib is not None:
+                memory.append((duration_s * int(match[1]) / int(match[2]), mib))
+    return Watched(process.returncode, memory, "".join(said[-5:]))
+
+
+def _processes(first: int) -> list[int]:
+    """A process and all that it has started."""
+    try:
+        return [first, *(child.pid for child in psutil.Process(first).children(recursive=True))]
+    except psutil.Error:
+        return [first]
+
+
+@dataclass(frozen=True)
+class Poses:
+    """How one robot's poses came, of a live run, and how right they were.
+
+    Attributes:
+        late_ms: (N,) time from each image to its pose [ms]; none where the run was not live.
+        dropped: Number of images that were dropped.
+        final_m: RMS error of the final positions [m].
+    """
+
+    late_ms: np.ndarray
+    dropped: int
+    final_m: float
+
+    @classmethod
+    def of(cls, table: ResultTable, robot: str) -> Poses:
+        """By the results of a run."""
+        dropped = table.values(LIVE_STAGE, f"{robot}_dropped")
+        final = table.values("trajectory", f"{robot}_final_ate_se3_rmse_m")
+        late_ms = table.values(LIVE_STAGE, f"{robot}_posed_ms")
+        return cls(late_ms, int(dropped.sum()), float(final[0]))
+
+
+def poses(out: Path) -> dict[str, Poses]:
+    """Both robots' poses by the results in a folder."""
+    table = ResultTable.read(out / "results.parquet")
+    return {robot: Poses.of(table, robot) for robot in ROBOTS}
