@@ -137,6 +137,7 @@ def _matched(table: ResultTable) -> Reading:
     wide = rows.pivot(index=keys, columns="metric", values="value")
     if "asift_claimed" not in wide:
         return _share(lambda _: wide.iloc[:0].sum(axis=1))(table)
+    wide = wide.dropna(subset="asift_claimed")  # other baselines' rows, as of one not installed
     right = (wide["asift_claimed"] > 0) & (wide["asift_horizontal_m"] <= LOCATED_M)
     return _share(lambda _: right.astype(float))(table)
 

@@ -91,6 +91,12 @@ def test_asift_is_counted_indoors_and_outdoors_apart() -> None:
     assert verdict("fig03_asift_indoors", more) == "not measured"
 
 
+def test_a_baseline_that_was_not_run_is_no_pair_of_asift() -> None:
+    missing = Row("paper_a", 0, 0, TWIN, "baseline", "xfeat_missing", 1.0, "")
+    found = reproduction_summary(ResultTable.from_rows([*asift("paper_a", 3, 2, 15), missing]))
+    assert (found["fig03_asift_indoors"].value, found["fig03_asift_indoors"].n) == (0.15, 20)
+
+
 def test_outdoor_sequences_count_in_their_own_row_only() -> None:
     table = ResultTable.concat(
         [located([0.1] * 10, 4), located([9.0] * 10, 4, scene="paper_outdoor")]
