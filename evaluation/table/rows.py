@@ -84,10 +84,6 @@ class Row:
     note: str = ""
     time_s: float | None = None
 
-    def as_record(self) -> dict[str, object]:
-        record = {k: v for k, v in self.__dict__.items() if k != "condition"}
-        return record | asdict(self.condition)
-
 
 @dataclass(frozen=True, eq=False)
 class ResultTable:
@@ -104,7 +100,14 @@ class ResultTable:
 
     @classmethod
     def from_rows(cls, rows: Iterable[Row]) -> ResultTable:
-        return cls(pd.DataFrame.from_records([r.as_record() for r in rows], columns=list(_DTYPES)))
+        # Column by column: as records, rows would take almost three times the memory.
+        kept = list(rows)
+        of_condition = Condition.__dataclass_fields__
+        columns = {
+            name: [getattr(row.condition if name in of_condition else row, name) for row in kept]
+            for name in _DTYPES
+        }
+        return cls(pd.DataFrame(columns))
 
     @classmethod
     def concat(cls, tables: Sequence[ResultTable]) -> ResultTable:
