@@ -32,6 +32,8 @@ class View(Verb):
 
     runs: Annotated[Positional[tuple[Path, ...]], Shown("RUN [RUN]")]
     """folder that run --rerun has written, or its run.rrd; two to compare them"""
+    at: Annotated[float | None, Shown("SECONDS")] = None
+    """open one run at this moment of the sensors, and wait there [plays from its start]"""
     serve: Annotated[bool, IN_PLACE_OF_A_WINDOW] = False
     """serve the viewer for a browser, until Ctrl-C"""
     save: Annotated[Path | None, IN_PLACE_OF_A_WINDOW, Shown("FILE")] = None
@@ -50,7 +52,7 @@ class View(Verb):
             raise InputError(
                 "no screen here: --serve shows it in a browser, --save FILE takes it elsewhere"
             )
-        with together(files) as shown:
+        with shown_file(files, self.at) as shown:
             self._show(shown)
 
     def _show(self, file: Path) -> None:
@@ -75,15 +77,33 @@ class View(Verb):
 
 
 @contextmanager
-def together(files: Sequence[Path]) -> Iterator[Path]:
-    """The file to show: that of the only run, or one of both, whose first differences are printed.
+def shown_file(files: Sequence[Path], at_s: float | None = None) -> Iterator[Path]:
+    """The file to show: that of the only run, a copy of it that opens at `at_s` [s], or one of both
+    runs, whose first differences are printed.
 
     Raises:
-        InputError: Two runs cannot be held against each other.
+        InputError: The run has nothing at that time, or two runs cannot be held against each other.
     """
-    if len(files) == 1:
+    if len(files) == 1 and at_s is None:
         yield files[0]
-        return
+    elif at_s is None:
+        with _both(files) as both:
+            yield both
+    elif len(files) == 1:
+        from evaluation.show.rerun_view.one_moment import write_from
+        from evaluation.show.rerun_view.trace import RunFile
+
+        with ScratchFolder() as folder:
+            moment = folder.path / "moment.rrd"
+            write_from(RunFile.open(files[0], files[0].parent.name), at_s, moment)
+            yield moment
+    else:
+        raise InputError("--at is for one run; two open at their first difference")
+
+
+@contextmanager
+def _both(files: Sequence[Path]) -> Iterator[Path]:
+    """Two runs in one file; prints their first differences."""
     from evaluation.judge.runs import distinct_names
     from evaluation.setup.progress import step
     from evaluation.show.rerun_view.differences import hold_files, print_differences

@@ -82,9 +82,10 @@ class RunView:
         self._stream.close()
 
 
-def layout(with_truth: bool, times_ns: Times) -> rrb.Blueprint:
+def layout(with_truth: bool, times_ns: Times, opens: str = TIMELINE) -> rrb.Blueprint:
     """The world on the left, the results of each stage on the right, curves below over all times.
-    Without truth there is no panel for it."""
+    Without truth there is no panel for it. `opens` is the timeline on which it opens: that of the
+    sensors plays, another waits at its beginning."""
     return rrb.Blueprint(
         rrb.Vertical(
             rrb.Horizontal(
@@ -97,7 +98,11 @@ def layout(with_truth: bool, times_ns: Times) -> rrb.Blueprint:
         ),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="playing"),
+        rrb.TimePanel(
+            state="collapsed",
+            timeline=opens,
+            play_state="playing" if opens == TIMELINE else "paused",
+        ),
         auto_layout=False,
         auto_views=False,
     )

@@ -21,6 +21,7 @@ from rerun.chunk import Chunk, RrdReader
 from airground.core.se3 import SE3
 from evaluation.judge.divergence import Held, first_divergence
 from evaluation.show.figures.scene_pictures import tinted
+from evaluation.show.rerun_view.later_start import also_from
 from evaluation.show.rerun_view.sensor_stream import (
     GROUND,
     TIMELINE,
@@ -51,8 +52,6 @@ FRAME_NAMES = ("Transform3D:child_frame", "Transform3D:parent_frame", "Coordinat
 MARKER = rr.SeriesPoints(
     colors=[RED], markers="diamond", names=["first difference"], marker_sizes=[5]
 )
-OF_A_MOMENT = {"Scalars:scalars", "TextLog:text"}
-"""Components that say something of their time only; others hold until they are set again."""
 GROUND_MAP = "/ground/map"
 """Grey in the first run, so that the paths and aerial maps of both are seen on it."""
 CLOUDS = ("/mav/map", "/mav/surface", GROUND_MAP)
@@ -114,33 +113,11 @@ def _drawn(side: Side, since_ns: int | None) -> Iterator[Chunk]:
     """The chunks of a run in its place and colour."""
     content = SHARED_TRUTH if side.root else ("+ /**", "- /__properties/**")
     for chunk in RrdReader(side.file.path).stream().filter(content=list(content)):
-        for batch in _from(since_ns, _changed(chunk, side)):
-            (changed,) = Chunk.from_record_batch(batch)
+        batch = _changed(chunk, side)
+        timed = [batch] if since_ns is None else also_from(since_ns, FROM_DIFFERENCE, batch)
+        for rows in timed:
+            (changed,) = Chunk.from_record_batch(rows)
             yield changed.with_entity_path(side.root + chunk.entity_path)
-
-
-def _from(since_ns: int | None, batch: pa.RecordBatch) -> Iterator[pa.RecordBatch]:
-    """Rows also on the clock that begins at the first difference.
-
-    There a viewer starts with all that was last set before; curves and messages of before are left
-    out of it, since they would all lie at its beginning.
-    """
-    if since_ns is None or TIMELINE not in batch.schema.names:
-        yield batch
-        return
-    stamps = batch.column(TIMELINE).cast(pa.int64()).to_numpy()
-    early = np.zeros(len(stamps), bool)
-    if not OF_A_MOMENT.isdisjoint(batch.schema.names):
-        early = stamps < since_ns
-    if early.any():
-        yield batch.filter(pa.array(early))
-    if not early.all():
-        rest, stamps = batch.filter(pa.array(~early)), stamps[~early]
-        clock = pa.array(np.maximum(stamps, since_ns)).cast(pa.duration("ns"))
-        meaning = {"rerun:kind": "index", "rerun:index_name": FROM_DIFFERENCE}
-        field = pa.field(FROM_DIFFERENCE, clock.type, metadata=meaning)
-        position = rest.schema.get_field_index(TIMELINE) + 1
-        yield rest.add_column(position, field, clock)
 
 
 def _changed(chunk: Chunk, side: Side) -> pa.RecordBatch:

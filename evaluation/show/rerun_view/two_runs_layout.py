@@ -21,8 +21,7 @@ SECOND_FRAME = "second_"
 DIFFERENCES, MARKERS = "/differences", "/differences/curves"
 """Messages at the first differences, and points in the plots at the earliest."""
 FROM_DIFFERENCE = "from_first_difference"
-"""A timeline with the stamps of `sensor_time` that begins at the earliest difference: a layout
-cannot place the time cursor, but a viewer starts where its timeline begins."""
+"""A timeline with the stamps of `sensor_time` that begins at the earliest difference."""
 LEFT_M = 0.5
 """How far the eye moves to the left [m]: the panel is narrower than that of one run."""
 
