@@ -136,6 +136,8 @@ def test_a_map_without_overlap_neither_kills_the_belief_nor_claims(flight):
         found.append(last.belief)
     assert not found[1].converged
     assert "lies on the ground map" in found[1].refusal
+    assert found[1].overlap == 0.0
+    assert found[2].overlap > 0.9
     assert np.hypot(*(found[2].estimate[:2] - PATH[0])) < 0.1
 
 

@@ -195,6 +195,7 @@ def _curves(with_truth: bool, times_ns: Times) -> rrb.Horizontal:
         *(errors if with_truth else []),
         rrb.Tabs(
             plot("/curves/spread_m", "spread [m]"),
+            plot("/curves/overlap", "overlap"),
             plot("/curves/inliers", "inliers"),
         ),
         rrb.Tabs(

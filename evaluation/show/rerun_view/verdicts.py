@@ -15,7 +15,9 @@ from evaluation.table.limits import LOCATED_M, is_good_pose
 from evaluation.table.truth_errors import pose_error
 from sim.recording.truth import Truth
 
-SPREAD, INLIERS, CORNERS = f"{ROOM}/spread_m", f"{ROOM}/inliers", f"{ROOM}/corners"
+SPREAD, OVERLAP, INLIERS, CORNERS = (
+    f"{ROOM}/{curve}" for curve in ("spread_m", "overlap", "inliers", "corners")
+)
 REFUSED, LOST, WRONG = "refused", "lost", "wrong_claim"
 LIMIT_GREY, RED, GREEN = (150, 150, 150), (255, 70, 70), (53, 196, 106)
 
@@ -26,14 +28,16 @@ class Verdicts:
     def __init__(self, stream: SensorStream, config: Config, truth: Truth | None) -> None:
         self._stream, self._truth = stream, truth
         self._spread_limit_m = config.localization.converged_spread_m
+        self._least_overlap = config.localization.min_overlap
         self._least_inliers = config.refinement.min_inliers
-        for limit, name in ((SPREAD, "largest"), (INLIERS, "least")):
+        for limit, name in ((SPREAD, "largest"), (OVERLAP, "least"), (INLIERS, "least")):
             stream.log_always(
                 f"{limit}/limit",
                 rr.SeriesLines(colors=[LIMIT_GREY], names=[name], widths=[1.0]),
             )
-        stream.log_always(INLIERS, rr.SeriesLines(colors=[GREEN], names=["inliers"], widths=[1.5]))
-        marked = [f"{SPREAD}/{REFUSED}", f"{INLIERS}/{REFUSED}"]
+        for curve, name in ((OVERLAP, "overlap"), (INLIERS, "inliers")):
+            stream.log_always(curve, rr.SeriesLines(colors=[GREEN], names=[name], widths=[1.5]))
+        marked = [f"{curve}/{REFUSED}" for curve in (SPREAD, OVERLAP, INLIERS)]
         marked += [_lost(robot) for robot in ROBOT.values()]
         marked += [] if truth is None else [_wrong("translation_m"), _wrong("rotation_deg")]
         for entity in marked:
@@ -44,8 +48,12 @@ class Verdicts:
         match seen.event:
             case BeliefUpdated(belief=belief):
                 self._draw(stamp_ns, f"{SPREAD}/limit", self._spread_limit_m)
+                self._draw(stamp_ns, OVERLAP, belief.overlap)
+                self._draw(stamp_ns, f"{OVERLAP}/limit", self._least_overlap)
                 if belief.refusal:
                     self._draw(stamp_ns, f"{SPREAD}/{REFUSED}", belief.spread_m)
+                if not belief.overlap > self._least_overlap:
+                    self._draw(stamp_ns, f"{OVERLAP}/{REFUSED}", belief.overlap)
                 self._mark_wrong(seen, belief)
             case Aligned(alignment=alignment):
                 self._draw(stamp_ns, INLIERS, alignment.inliers)

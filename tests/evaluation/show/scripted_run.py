@@ -64,6 +64,7 @@ BELIEF = Belief(
     estimate=np.array([1.1, 0.2, 0.3]),
     covariance=np.diag([0.04, 0.01]),
     cost=0.1,
+    overlap=0.8,
     height_offset=0.1,
     T_ground_mav=T_BELIEVED,
     converged=True,

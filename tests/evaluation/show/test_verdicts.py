@@ -49,12 +49,15 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> ReadBack:
 def test_thresholds_stand_beside_what_they_judge(good: ReadBack) -> None:
     t = 3 * SECOND
     assert of(good, "/curves/spread_m/limit") == [(t, CONFIG.localization.converged_spread_m)]
+    assert of(good, "/curves/overlap") == [(t, pytest.approx(0.8))]
+    assert of(good, "/curves/overlap/limit") == [(t, CONFIG.localization.min_overlap)]
     assert of(good, "/curves/inliers") == [(t, pytest.approx(0.9))]
     assert of(good, "/curves/inliers/limit") == [(t, CONFIG.refinement.min_inliers)]
 
 
 def test_a_good_run_has_no_mark_but_of_its_loss(good: ReadBack) -> None:
-    marks = ("/curves/spread_m/refused", "/curves/inliers/refused", "/curves/corners/ground/lost")
+    judged = ("spread_m", "overlap", "inliers")
+    marks = [*(f"/curves/{curve}/refused" for curve in judged), "/curves/corners/ground/lost"]
     for entity in (*marks, "/truth/error/translation_m/wrong_claim"):
         assert of(good, entity) == []
     assert of(good, "/curves/corners/mav/lost") == [(4 * SECOND, 0.0)]
@@ -65,6 +68,12 @@ def test_refusals_are_marked_where_they_were_made(tmp_path: Path) -> None:
     events = changed(BeliefUpdated(3 * SECOND, refused))
     read = ReadBack(written(tmp_path / "belief.rrd", events=events))
     assert of(read, "/curves/spread_m/refused") == [(3 * SECOND, pytest.approx(BELIEF.spread_m))]
+    assert of(read, "/curves/overlap/refused") == []
+    beside = replace(refused, overlap=0.1, refusal="no overlap")
+    read = ReadBack(
+        written(tmp_path / "beside.rrd", events=changed(BeliefUpdated(3 * SECOND, beside)))
+    )
+    assert of(read, "/curves/overlap/refused") == [(3 * SECOND, pytest.approx(0.1))]
     read = ReadBack(written(tmp_path / "alignment.rrd", events=seen_events(accepted=False)))
     assert of(read, "/curves/inliers/refused") == [(3 * SECOND, pytest.approx(0.9))]
 
