@@ -114,13 +114,6 @@ def _keep_freed_memory() -> None:
     mallopt(_M_TRIM_THRESHOLD, KEPT_BYTES)
 
 
-def hand_back_memory() -> None:
-    """Return the freed memory that was kept to the system, before other work begins."""
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # glibc only
-    if trim is not None:
-        trim(0)
-
-
 def _loads(soname: str) -> bool:
     try:
         ctypes.CDLL(soname)

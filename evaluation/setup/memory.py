@@ -15,7 +15,7 @@ from typing import Self
 
 import psutil
 
-from evaluation.setup.environment import hand_back_memory
+from airground.core.freed_memory import hand_back_memory
 
 STATUS, CLEAR_REFS = Path("/proc/self/status"), Path("/proc/self/clear_refs")
 RESET_HIGH_WATER_MARK = "5"

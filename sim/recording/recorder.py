@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from airground.core.freed_memory import hand_back_memory
 from airground.core.messages import ImuSamples, MagneticSamples
 from airground.core.scratch_folder import ScratchFolder
 from airground.errors import AirgroundError, InputError
@@ -245,13 +246,15 @@ def _unlit_files(root: Path) -> WorldFiles:
 
 def with_models(plan: FramePlan, plain: World) -> FramePlan:
     """Paint the worlds once for all processes, for pictures take long to make, and meter their
-    light; the plan is then complete."""
+    light; the plan is then complete. What painting took of memory is handed back before drawing."""
     drive = painted(plain)
     _store_model(plan, plan.worlds["ground"], drive)
     if plan.worlds["mav"] != plan.worlds["ground"]:
         _store_model(plan, plan.worlds["mav"], flight_world(drive))
     if plan.unlit is not None:
         _store_model(plan, plan.unlit, unlit_world(drive))
+    del drive
+    hand_back_memory()
     return with_exposure(plan)
 
 

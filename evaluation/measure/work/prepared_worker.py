@@ -14,7 +14,8 @@ from typing import Any
 
 from distributed import Worker, WorkerPlugin
 
-from evaluation.setup.environment import hand_back_memory, prepare
+from airground.core.freed_memory import hand_back_memory
+from evaluation.setup.environment import prepare
 
 
 class PreparedWorker(WorkerPlugin):
