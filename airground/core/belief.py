@@ -75,11 +75,12 @@ class Belief:
         estimate: (3,) float64: the reported x, y, heading.
         covariance: (2, 2) float64 covariance of x and y [m^2].
         cost: Cost at the estimate, NaN where the overlap is too small.
-        overlap: Share of the aerial map's filled cells that lie on the ground map at the estimate.
         height_offset: Delta z of Sec. VI-A [m], to be added to heights in `mav`.
         T_ground_mav: The estimate as a motion between the robots' maps.
         converged: Whether a position is claimed.
         refusal: Reason why no position is claimed; empty when converged.
+        overlap: Share of the aerial map's filled cells that lie on the ground map at the estimate;
+            NaN if read from results that do not have it.
     """
 
     stamp_ns: int
@@ -87,11 +88,11 @@ class Belief:
     estimate: F64
     covariance: F64
     cost: float
-    overlap: float
     height_offset: float
     T_ground_mav: SE3
     converged: bool
     refusal: str
+    overlap: float = float("nan")
 
     def __post_init__(self) -> None:
         for name, shape in (("particles", (None, 3)), ("estimate", (3,)), ("covariance", (2, 2))):

@@ -124,11 +124,11 @@ class MonteCarloLocalizer:
             estimate=estimate,
             covariance=np.cov(particles[:, :2].T),
             cost=float(overlay.costs(self._local)[0]),
-            overlap=float(overlay.overlaps()[0]),
             height_offset=offset,
             T_ground_mav=motion_at(estimate, pair.position_mav, offset),
             converged=not refusal,
             refusal=refusal,
+            overlap=float(overlay.overlaps()[0]),
         )
 
     def _why_refused(

@@ -5,7 +5,7 @@ Files are arrays (.npz) and clouds (.ply), without pickles: figures are redrawn 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import MISSING, dataclass, fields, is_dataclass
 from pathlib import Path
 from types import UnionType
 from typing import Any, Union, get_args, get_origin, get_type_hints
@@ -155,17 +155,25 @@ def _flat(name: str, value: Any) -> dict[str, NDArray]:
 
 
 def _built(name: str, kind: Any, entries: dict[str, NDArray]) -> Any:
-    """Inverse of `_flat` for a value of a declared type."""
+    """Inverse of `_flat` for a value of a declared type. A member with a default may be missing, in
+    results from before it was there."""
+
+    def is_stored(name: str) -> bool:
+        return any(entry == name or entry.startswith(f"{name}.") for entry in entries)
+
     if get_origin(kind) in (Union, UnionType):
-        stored = any(entry == name or entry.startswith(f"{name}.") for entry in entries)
-        return _built(name, get_args(kind)[0], entries) if stored else None
+        return _built(name, get_args(kind)[0], entries) if is_stored(name) else None
     if get_origin(kind) is tuple:
         count = int(entries[f"{name}.count"])
         return tuple(_built(f"{name}.{i}", get_args(kind)[0], entries) for i in range(count))
     if is_dataclass(kind):
         hints = get_type_hints(kind)
         return kind(  # type: ignore[operator]
-            **{m.name: _built(f"{name}.{m.name}", hints[m.name], entries) for m in fields(kind)}
+            **{
+                member.name: _built(f"{name}.{member.name}", hints[member.name], entries)
+                for member in fields(kind)
+                if member.default is MISSING or is_stored(f"{name}.{member.name}")
+            }
         )
     value = entries[name]
     return kind(value) if kind in (int, float, str, bool) else value

@@ -231,7 +231,7 @@ def _localization(
         covariance = np.cov(particles[:, :2].T)
         estimate = np.append(particles[:, :2].mean(axis=0), 0.0)
         belief = Belief(
-            number, particles, estimate, covariance, 0.1, 0.8, 0.0, SE3.identity(), number > 1, ""
+            number, particles, estimate, covariance, 0.1, 0.0, SE3.identity(), number > 1, "", 0.8
         )
         cost_map = CostMap(costs.astype(np.float32), np.array([-3.0, -3.0]), cells, 0.0, "ncc")
         steps.append(LocalizationStep(cost_map, belief, u))

@@ -109,7 +109,7 @@ def test_the_distance_is_that_of_the_particles() -> None:
     for off in ([0.0, 0.0], [0.1, -0.2]):
         belief = Belief(
             5, np.zeros((3, 3)), np.array([*(true_u + off), 0.7]), COVARIANCE,
-            0.0, 1.0, 0.0, T_ground_mav, True, "",
+            0.0, 0.0, T_ground_mav, True, "",
         )  # fmt: skip
         found = squared_mahalanobis(belief, cast(Sighting, sighting), cast(Truth, truth))
         assert found == pytest.approx(off @ np.linalg.inv(COVARIANCE) @ off)

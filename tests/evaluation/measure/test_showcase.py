@@ -81,6 +81,18 @@ def test_a_missing_entry_is_named(showcase: Showcase, tmp_path: Path) -> None:
         Showcase.load(tmp_path)
 
 
+def test_results_from_before_the_overlap_was_kept_are_read(
+    showcase: Showcase, tmp_path: Path
+) -> None:
+    showcase.save(tmp_path)
+    with np.load(tmp_path / "showcase.npz") as stored:
+        entries = {name: stored[name] for name in stored.files if not name.endswith(".overlap")}
+        assert len(entries) < len(stored.files)
+    np.savez(tmp_path / "showcase.npz", **entries)  # type: ignore[arg-type]
+    steps = Showcase.load(tmp_path).steps
+    assert all(np.isnan(step.belief.overlap) for step in steps)
+
+
 def test_a_cut_cloud_is_refused(showcase: Showcase, tmp_path: Path) -> None:
     showcase.save(tmp_path)
     path = tmp_path / "ground.ply"

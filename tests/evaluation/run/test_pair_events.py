@@ -21,7 +21,6 @@ BELIEF = Belief(
     estimate=np.zeros(3),
     covariance=np.eye(2),
     cost=1.0,
-    overlap=1.0,
     height_offset=0.0,
     T_ground_mav=SE3.identity(),
     converged=True,

@@ -64,11 +64,11 @@ BELIEF = Belief(
     estimate=np.array([1.1, 0.2, 0.3]),
     covariance=np.diag([0.04, 0.01]),
     cost=0.1,
-    overlap=0.8,
     height_offset=0.1,
     T_ground_mav=T_BELIEVED,
     converged=True,
     refusal="",
+    overlap=0.8,
 )
 DEPTH = np.full((48, 64), 1.75, np.float32)
 DEPTH[:4] = np.nan
