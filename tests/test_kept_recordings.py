@@ -59,13 +59,15 @@ def test_a_change_of_the_simulator_removes_what_it_recorded(project: Path, name:
     first = kept(project)
     assert first is not None
     first.mkdir()
-    (project / "results/regression").mkdir()
+    own = [project / "results" / name for name in ("regression", "recordings-of-my-robot")]
+    for folder in own:
+        folder.mkdir()
     (project / name).write_text("changed")
     second = kept(project)
     assert second is not None
     assert second != first
     assert not first.exists()
-    assert (project / "results/regression").exists()
+    assert all(folder.exists() for folder in own)
 
 
 def test_a_full_disk_keeps_none_but_uses_what_is_there(project: Path) -> None:
