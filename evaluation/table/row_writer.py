@@ -50,7 +50,13 @@ class RowWriter:
     ) -> None:
         """A filter's belief after one aerial map, and its error (Fig. 11, 12).
         `origin` states how it was made, where not by the pipeline itself."""
-        add = partial(self.add, "localization", sequence=sequence, iteration=iteration)
+        add = partial(
+            self.add,
+            "localization",
+            sequence=sequence,
+            iteration=iteration,
+            time_s=belief.stamp_ns * 1e-9,
+        )
         add("error_m", error.horizontal_m, "m", note=origin)
         add("error_deg", error.rotation_deg, "deg")
         add("spread_m", belief.spread_m, "m")
@@ -72,8 +78,8 @@ class RowWriter:
         stage: str = "refinement",
     ) -> None:
         """A refinement (Fig. 13, 14): errors by time, "before" and "after" among them."""
+        add = partial(self.add, stage, trial=trial, time_s=alignment.stamp_ns * 1e-9)
         for when, error in errors.items():
-            self.add(stage, f"{when}_translation_m", error.translation_m, "m", trial=trial)
-            self.add(stage, f"{when}_rotation_deg", error.rotation_deg, "deg", trial=trial)
-        accepted, refusal = alignment.accepted, alignment.refusal
-        self.add(stage, "accepted", accepted, "", trial=trial, note=refusal)
+            add(f"{when}_translation_m", error.translation_m, "m")
+            add(f"{when}_rotation_deg", error.rotation_deg, "deg")
+        add("accepted", alignment.accepted, "", note=alignment.refusal)

@@ -67,7 +67,8 @@ class Row:
         stage, metric, value, unit: The measurement; NaN where a failure left no number.
         sequence, iteration, trial: Their numbers, where that applies; iterations count from 1.
         note: A reason in words, for example of a refusal.
-        time_s: Time in the recording, of a value that is measured over time [s].
+        time_s: Of a value that is measured over time, time since the first image; of a belief or an
+            alignment, stamp of its surface on the sensors' clock [s].
     """
 
     scene: str
@@ -135,8 +136,7 @@ class ResultTable:
         """Raise InputError, naming `origin`, if a numbered measurement is there twice."""
         frame = self.frame
         numbered = frame[frame[["sequence", "iteration", "trial"]].notna().any(axis=1)]
-        once = numbered[numbered["time_s"].isna()]
-        again = once[once.duplicated([name for name in _DTYPES if name not in _MEASURED])]
+        again = numbered[numbered.duplicated([name for name in _DTYPES if name not in _MEASURED])]
         if len(again):
             row = again.iloc[0]
             raise InputError(

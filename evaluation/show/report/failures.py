@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from evaluation.setup.condition import Condition
-from evaluation.setup.text import MISSING, TextTable, degrees, metres
+from evaluation.setup.text import MISSING, TextTable, degrees, formatted, metres
 from evaluation.table.limits import FOURTH_MAP, LOCATED_M, is_good_pose
 from evaluation.table.rows import SEQUENCE_KEYS, ResultTable
 
@@ -22,6 +22,7 @@ class Failure:
         place: Scene, seed, flight, and number of the sequence or trial.
         said: What the pipeline reported: a claim, or the reason of a refusal.
         story: The errors step by step.
+        at_s: When, on the sensors' clock [s]; None where nothing was made.
     """
 
     kind: str
@@ -29,6 +30,7 @@ class Failure:
     result: str
     said: str
     story: TextTable
+    at_s: float | None
 
     @property
     def key(self) -> tuple[str, str, int, int, int]:
@@ -69,7 +71,8 @@ def _failed_sequences(table: ResultTable) -> Iterator[Failure]:
     if len(errors) == 0:
         return
     judged = min(FOURTH_MAP, errors.shape[1])
-    notes = table.rows("localization", "converged").set_index([*SEQUENCE_KEYS, "iteration"])["note"]
+    rows = table.rows("localization", "converged").set_index([*SEQUENCE_KEYS, "iteration"])
+    notes, times = rows["note"], rows["time_s"]
     each = (frame.to_numpy(np.float64) for frame in (errors, spreads))
     for key, error, spread in zip(errors.index.to_list(), *each, strict=True):
         if error[judged - 1] <= LOCATED_M:
@@ -77,9 +80,12 @@ def _failed_sequences(table: ResultTable) -> Iterator[Failure]:
         said = [
             str(notes.get((*key, n), "")) or "position claimed" for n in range(1, len(error) + 1)
         ]
+        when = [_seconds(times.get((*key, n))) for n in range(1, len(error) + 1)]
         steps = tuple(
-            (str(n), _off(off), metres(wide), words)
-            for n, (off, wide, words) in enumerate(zip(error, spread, said, strict=True), 1)
+            (str(n), formatted(at_s, "{:.2f} s"), _off(off), metres(wide), words)
+            for n, (at_s, off, wide, words) in enumerate(
+                zip(when, error, spread, said, strict=True), 1
+            )
         )
         result = f"{_off(error[judged - 1])} after {judged}"
         if len(error) > judged:
@@ -90,7 +96,8 @@ def _failed_sequences(table: ResultTable) -> Iterator[Failure]:
             (str(scene), int(seed), int(flight), int(sequence)),
             result,
             said[judged - 1],
-            TextTable(("aerial map", "error", "spread", "result"), steps),
+            TextTable(("aerial map", "time", "error", "spread", "result"), steps),
+            when[judged - 1],
         )
 
 
@@ -99,7 +106,8 @@ def _failed_trials(table: ResultTable) -> Iterator[Failure]:
     if "after_translation_m" not in trials:
         return
     rows = table.rows("refinement", "accepted")
-    notes = rows.set_index(["scene", "seed", "flight", "trial"])["note"]
+    by_trial = rows.set_index(["scene", "seed", "flight", "trial"])
+    notes, times = by_trial["note"], by_trial["time_s"]
     for key, trial in zip(trials.index.to_list(), trials.to_dict("records"), strict=True):
         accepted = trial.get("accepted", 1.0) > 0
         off_m, off_deg = trial["after_translation_m"], trial["after_rotation_deg"]
@@ -117,6 +125,7 @@ def _failed_trials(table: ResultTable) -> Iterator[Failure]:
             f"{_off(off_m)}, {degrees(off_deg)}",
             "accepted" if accepted else f"refused: {notes.get((scene, seed, flight, number), '')}",
             TextTable(("when", "position error", "angle error"), steps),
+            _seconds(times.get((scene, seed, flight, number))),
         )
 
 
@@ -125,6 +134,11 @@ _MOMENTS = (
     ("after", "after refinement"),
     ("from_truth", "the same, started at the truth"),
 )
+
+
+def _seconds(time_s: object) -> float | None:
+    """A time of a table, which has none where nothing was made."""
+    return time_s if isinstance(time_s, float) and np.isfinite(time_s) else None
 
 
 def _off(metres_off: float) -> str:

@@ -162,7 +162,7 @@ def test_every_failure_leads_to_what_happened(table: ResultTable, page: tuple[Pa
     hopeless = failures(table.of(LITERAL).scored())
     sequence = next(failure for failure in hopeless if failure.kind == "sequence")
     assert [row[0] for row in sequence.story.rows] == [str(n) for n in range(1, 13)]
-    assert sequence.result.startswith(sequence.story.rows[3][1])
+    assert sequence.result.startswith(sequence.story.rows[3][2])
 
 
 def test_failures_lead_to_the_run_in_rerun_where_it_was_kept(
@@ -174,6 +174,23 @@ def test_failures_lead_to_the_run_in_rerun_where_it_was_kept(
     write_report(tmp_path, table, None, RUN)
     kept = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert ("run RECORDING --rerun" in kept, "red crosses" in kept) == (False, True)
+
+
+def test_a_failure_says_when_it_happened_and_how_to_open_that_moment(
+    table: ResultTable, tmp_path: Path
+) -> None:
+    frame = table.frame.copy()
+    of_maps = frame["stage"].isin(["localization", "refinement"])
+    frame.loc[of_maps, "time_s"] = 10.0 + frame["iteration"].astype("float64").fillna(0.5)
+    timed = ResultTable(frame)
+    made = failures(timed.of(BEST).scored())
+    for failure in made:
+        assert failure.at_s == (14.0 if failure.kind == "sequence" else 10.5)
+        assert failure.kind == "refinement" or failure.story.rows[3][1] == "14.00 s"
+    (tmp_path / "run.rrd").touch()
+    write_report(tmp_path, timed, None, RUN)
+    html = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert html.count("airground view FOLDER --at 1") == len(made)
 
 
 def test_a_sequence_without_estimate_is_a_failure() -> None:
