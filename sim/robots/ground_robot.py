@@ -81,7 +81,7 @@ def plan_drive(ground: GroundPath, floor: FloorHeight, rng: np.random.Generator)
     waypoints += noise * [WAYPOINT_NOISE_M, WAYPOINT_NOISE_M, HEADING_NOISE_RAD]
     turn_rps = np.deg2rad(ground.turn_dps)
     planar = heading_path(waypoints, ground.speed_mps, turn_rps, REST_S)
-    return Drive(planar, _chassis_curve(planar, floor, rng))
+    return Drive(planar, chassis_curve(planar, floor, rng))
 
 
 def drive(
@@ -103,7 +103,7 @@ def drive(
     )
 
 
-def _chassis_curve(
+def chassis_curve(
     planar: WaypointPath, floor: FloorHeight, rng: np.random.Generator
 ) -> SmoothCurve:
     """Height and tilt from the floor under the wheels, plus a rattle that grows with travel."""

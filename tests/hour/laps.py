@@ -25,7 +25,7 @@ from sim.robots.flight import (
     FlightPlan,
     fly,
 )
-from sim.robots.ground_robot import Drive, _chassis_curve, drive, floor_under, mounting
+from sim.robots.ground_robot import Drive, chassis_curve, drive, floor_under, mounting
 from sim.robots.motion import RATE_HZ, STEP_NS, Motion
 from sim.robots.paths import (
     heading_path,
@@ -103,7 +103,7 @@ def fly_laps(world: World, scene: Scene, seed: int, duration_s: float) -> Laps:
 def _closed_route(ground: GroundPath, world: World, rng: np.random.Generator) -> Drive:
     waypoints = np.array([*ground.waypoints, ground.waypoints[0]]) * [1, 1, np.pi / 180]
     planar = heading_path(waypoints, ground.speed_mps, np.deg2rad(ground.turn_dps), 0.0)
-    return Drive(planar, _chassis_curve(planar, world.floor_height, rng))
+    return Drive(planar, chassis_curve(planar, world.floor_height, rng))
 
 
 def _flight_plan(
