@@ -78,11 +78,14 @@ def add_view(
     height, planes, width = costs.shape
     cap = np.float32(truncation)
     scale = np.float32(COST_SCALE)
+    # Unsigned indices, since a slice for each run would take longer than the run.
+    odd_begins, columns = np.uintp(width), np.uintp(width)
     for y in prange(height):
         if first_view:
             costs[y] = np.uint16(0)
-        top_even = np.empty(width + 1, np.float32)
-        top_odd = np.empty(width + 1, np.float32)
+        grey = reference[y]
+        # The row of the view at a plane: even columns, then odd ones.
+        line = np.empty(2 * width + 1, np.float32)
         for p in range(planes):
             v = row_scale[p] * y + row_shift[p]
             row = int(np.floor(v))
@@ -99,10 +102,11 @@ def add_view(
             odd0 = phases[row & 1, row >> 1, 1]
             even1 = phases[(row + 1) & 1, (row + 1) >> 1, 0]
             odd1 = phases[(row + 1) & 1, (row + 1) >> 1, 1]
-            for x in range(width):
-                top_even[x] = even0[x] + weight * (even1[x] - even0[x])
-            for x in range(width):
-                top_odd[x] = odd0[x] + weight * (odd1[x] - odd0[x])
+            for x in range(columns):
+                line[x] = even0[x] + weight * (even1[x] - even0[x])
+            for x in range(columns):
+                line[odd_begins + x] = odd0[x] + weight * (odd1[x] - odd0[x])
+            out, fraction = costs[y, p], fractions[p]
             first, last = width, 0
             for run in range(MAX_RUNS):
                 begin = starts[p, run]
@@ -113,20 +117,15 @@ def add_view(
                 # 2 x + offset >= lo and 2 x + offset + 1 < hi
                 begin = max(begin, (lo - offset + 1) >> 1)
                 end = min(end, (hi - offset - 2) // 2 + 1)
-                n = end - begin
-                if n <= 0:
+                if end <= begin:
                     continue
                 first, last = min(first, begin), max(last, end)
-                i = begin + (offset >> 1)
+                left = np.uintp(offset >> 1)
+                right = odd_begins + left
                 if offset & 1:
-                    left, right = top_odd[i : i + n], top_even[i + 1 : i + 1 + n]
-                else:
-                    left, right = top_even[i : i + n], top_odd[i : i + n]
-                out = costs[y, p, begin:end]
-                grey = reference[y, begin:end]
-                fraction = fractions[p, begin:end]
-                for x in range(n):
-                    sample = left[x] + fraction[x] * (right[x] - left[x])
+                    left, right = right, left + np.uintp(1)
+                for x in range(np.uintp(begin), np.uintp(end)):
+                    sample = line[x + left] + fraction[x] * (line[x + right] - line[x + left])
                     difference = min(abs(sample - grey[x]), cap) * scale + np.float32(0.5)
                     out[x] = np.uint16(np.uint32(out[x]) + np.uint32(np.int32(difference)))
             if last > first:
