@@ -103,6 +103,22 @@ class ImuNoise:
 
 
 @dataclass(frozen=True)
+class CalibrationSigmas:
+    """How well a calibration is known: standard deviations of its errors. The defaults are those
+    of a careful calibration.
+
+    Attributes:
+        mounting_rad: Of the camera's turn against the IMU, per axis [rad].
+        clock_s: Of the camera's clock against the IMU's [s].
+        depth_scale: Relative, of measured depth.
+    """
+
+    mounting_rad: float = float(np.deg2rad(0.1))
+    clock_s: float = 1e-3
+    depth_scale: float = 3e-3
+
+
+@dataclass(frozen=True)
 class RobotCalibration:
     """Nominal calibration of one robot's sensors, with the errors of a real calibration.
 
@@ -113,6 +129,7 @@ class RobotCalibration:
         imu: Noise of the inertial sensor; None where the robot has none, or no gyro.
         camera_time_offset_ns: Time on the IMU's clock minus the camera's stamp [ns].
         readout_s: Time from the first to the last row of an image [s]; 0 for a global shutter.
+        sigmas: How well all this is known.
     """
 
     camera: PinholeCamera
@@ -121,6 +138,7 @@ class RobotCalibration:
     imu: ImuNoise | None = None
     camera_time_offset_ns: int = 0
     readout_s: float = 0.0
+    sigmas: CalibrationSigmas = CalibrationSigmas()
 
 
 Message = MavImage | GroundImage | ImuSamples | MagneticSamples

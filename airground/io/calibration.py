@@ -5,12 +5,13 @@ elsewhere, in the same form."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from airground.core.messages import ImuNoise, RobotCalibration
+from airground.core.messages import CalibrationSigmas, ImuNoise, RobotCalibration
 from airground.core.se3 import FARTHEST_M, ROTATION_TOLERANCE, SE3
 from airground.io.lens import COEFFICIENTS, MAX_READOUT_S, Lens, Model, Undistortion
 from airground.io.registration import Registration
@@ -56,6 +57,14 @@ def _is_none(value: object) -> bool:
     return value is None
 
 
+Sigma = Annotated[float | None, Field(ge=0, exclude_if=_is_none)]
+"""A standard deviation; None where the file does not state it."""
+
+
+def _or(stated: float | None, usual: float) -> float:
+    return usual if stated is None else stated
+
+
 class CameraTable(Table):
     """A camera; integer pixel coordinates are pixel centres.
 
@@ -71,6 +80,8 @@ class CameraTable(Table):
     rate_hz: Positive
     time_offset_ns: int
     """What to add to a stamp of the camera to get the time on the IMU's clock [ns]."""
+    time_offset_sigma_ns: Sigma = None
+    """Standard deviation of that [ns]."""
     distortion_model: Annotated[Model | None, Field(exclude_if=_is_none)] = None
     distortion_coefficients: Annotated[
         tuple[float, ...], Field(exclude_if=lambda numbers: not numbers)
@@ -146,6 +157,8 @@ class DepthTable(Table):
 
     units_per_m: Positive
     """PNG value of one metre of depth along the optical axis."""
+    scale_sigma: Sigma = None
+    """Relative standard deviation of that."""
     delay_ns: Annotated[int, Field(exclude_if=_is_zero)] = 0
     """Time of a depth image minus that of the colour image with the same stamp [ns]."""
     T_camera_depth: Annotated[Pose | None, Field(exclude_if=_is_none)] = None
@@ -165,6 +178,8 @@ class RobotTable(Table):
 
     T_body_imu: Pose
     T_imu_camera: Pose
+    mounting_sigma_rad: Sigma = None
+    """Standard deviation of the turn in `T_imu_camera`, per axis [rad]."""
     camera: CameraTable
     imu: ImuTable
     magnetometer: MagnetometerTable
@@ -179,6 +194,17 @@ class RobotTable(Table):
             imu=self.imu.noise(),
             camera_time_offset_ns=self.camera.time_offset_ns,
             readout_s=undistortion.readout_s,
+            sigmas=self._sigmas(),
+        )
+
+    def _sigmas(self) -> CalibrationSigmas:
+        """How well it is known, as far as it is stated."""
+        usual = CalibrationSigmas()
+        clock_ns = self.camera.time_offset_sigma_ns
+        return replace(
+            usual,
+            mounting_rad=_or(self.mounting_sigma_rad, usual.mounting_rad),
+            clock_s=usual.clock_s if clock_ns is None else clock_ns * 1e-9,
         )
 
 
@@ -186,6 +212,10 @@ class GroundTable(RobotTable):
     """The ground robot also has a depth camera."""
 
     depth: DepthTable
+
+    def _sigmas(self) -> CalibrationSigmas:
+        known = super()._sigmas()
+        return replace(known, depth_scale=_or(self.depth.scale_sigma, known.depth_scale))
 
     def registration(self) -> Registration | None:
         """Moves depth to the pixels of the colour camera; None where it is registered."""

@@ -19,8 +19,6 @@ are this many times less certain."""
 MIN_SHARE = 0.4
 """A pose that fewer of the points agree on is chance."""
 PNP_ROUNDS = 100
-MOUNTING_SIGMA = np.deg2rad(0.1)
-"""Standard deviation of a calibrated mounting per axis [rad]."""
 
 
 def frame_pose(
@@ -121,24 +119,3 @@ def _consensus(
     chosen[rows.ravel()] = True
     rotation = nearest_rotation(cv2.Rodrigues(turn)[0])
     return SE3(rotation, shift.ravel().astype(np.float64)).inverse(), chosen
-
-
-def with_shared_errors(covariance: F64, lever: F64, scale_sigma: float, tilt_sigma: float) -> F64:
-    """(6, 6) covariance of a pose with the errors that all images share: scale, vertical, mounting.
-
-    Bundle adjustment takes the calibration as exact, so that its covariance lacks these, which
-    are most of the error.
-
-    Args:
-        covariance: (6, 6) covariance of position and rotation within the map, in its axes.
-        lever: (3,) vector from the map's first pose to the camera [m].
-        scale_sigma: Relative standard deviation of the map's scale.
-        tilt_sigma: Standard deviation of the map's vertical per axis [rad].
-    """
-    total = np.array(covariance)
-    total[:3, :3] += scale_sigma**2 * np.outer(lever, lever)
-    for axis in np.eye(3)[:2]:
-        moved = np.concatenate([np.cross(axis, lever), axis])
-        total += tilt_sigma**2 * np.outer(moved, moved)
-    total[3:, 3:] += MOUNTING_SIGMA**2 * np.eye(3)
-    return total

@@ -21,7 +21,7 @@ from airground.slam.culling import KeyframeCuller
 from airground.slam.doubt import Doubt, jumps, surprising
 from airground.slam.feature_tracker import FeatureTracker, expected_pixels
 from airground.slam.frame import Frame
-from airground.slam.frame_pose import frame_pose, with_shared_errors
+from airground.slam.frame_pose import frame_pose
 from airground.slam.front_end import TrackedCorners
 from airground.slam.geometry.pose_estimation import PoseFit
 from airground.slam.image_turn import ImageTurn
@@ -33,6 +33,7 @@ from airground.slam.map_adjustment import MapAdjuster
 from airground.slam.motion_model import MotionModel, Prediction
 from airground.slam.recovery import Recovery
 from airground.slam.rig_state import RigState
+from airground.slam.shared_errors import SharedErrors
 from airground.slam.sparse_map import SparseMap
 from airground.slam.spread_adjustment import WholeMap
 from airground.slam.starts import REST_WINDOW_NS, MovingStart
@@ -78,8 +79,7 @@ class KeyframeSlam:
         self._image_turn = ImageTurn(self.camera) if calibration.imu is None else None
         self.metric = self.inertial = False
         self._inverse_depth_sigma, self._max_depth_m = inverse_depth_sigma, max_depth_m
-        self._rng = rng
-        self.path = TrackedPath()
+        self._rng, self.path = rng, TrackedPath()
         self.reset()
 
     def reset(self) -> None:
@@ -88,9 +88,9 @@ class KeyframeSlam:
         self.tracker.clear()
         self.state = RigState.at_origin()
         self.stamp_ns: int | None = None
-        self._turn = np.eye(3)
-        self._seen_ns = 0
+        self._turn, self._seen_ns = np.eye(3), 0
         self._keyframe_covariance = np.zeros((6, 6))
+        self._shared_errors = SharedErrors(self.calibration.sigmas)
         self._doubt: Doubt | None = None
         self._torn = self._adrift = self.published = self.settled = False
         self.moved_from: SE3 | None = None
@@ -212,10 +212,10 @@ class KeyframeSlam:
         self.adjust_all()
 
     def covariance(self, fit: PoseFit, scale_sigma: float, tilt_sigma: float) -> F64:
-        """(6, 6) of the newest pose: that of the image within the map, and of the map."""
-        lever = fit.T_map_camera.translation - self.map.keyframes[0].state.position
-        within = fit.covariance + self._keyframe_covariance
-        return with_shared_errors(within, lever, scale_sigma, tilt_sigma)
+        """(6, 6) of the newest pose, within the map and of the map; to be asked once an image."""
+        motion = fit.T_map_camera.translation, self.state.velocity
+        shared = self._shared_errors.at(*motion, scale_sigma, tilt_sigma)
+        return fit.covariance + self._keyframe_covariance + shared
 
     def unseen_s(self) -> float:
         """How long ago an image gave a pose [s]."""

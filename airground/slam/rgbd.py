@@ -20,8 +20,6 @@ HAND_HELD = 1.5
 while its rows are read out."""
 MIN_FIRST_POINTS = 40
 """Least number of corners with depth in a map's first image."""
-DEPTH_SCALE_SIGMA = 3e-3
-"""Relative standard deviation of a depth camera's calibrated scale."""
 LEVEL_SIGMA = np.deg2rad(0.3)
 """Standard deviation of the vertical at rest per axis [rad]: an accelerometer bias of 50 mm/s^2."""
 
@@ -76,7 +74,7 @@ class RgbdSlam:
             image.stamp_ns,
             Tracking.TRACKED,
             slam.T_map_camera(),
-            covariance=slam.covariance(fit, DEPTH_SCALE_SIGMA, LEVEL_SIGMA),
+            covariance=slam.covariance(fit, slam.calibration.sigmas.depth_scale, LEVEL_SIGMA),
             depth_range=slam.depth_range(),
             corrected=corrected,
             corners=slam.corners(),

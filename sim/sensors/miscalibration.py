@@ -55,6 +55,7 @@ def calibrate(
 
     The cameras are as in the scene and the preset, with another nominal focal length, distortion
     and mounting; clocks and depth scale have their design values nominally, and other true values.
+    The nominal calibration states how large the errors are, as a laboratory's would.
 
     Args:
         mav_focal_px: True focal length of the MAV's camera [px].
@@ -100,6 +101,10 @@ def calibrate(
         )
         tables.append((true, nominal))
     (mav_true, mav_nominal), (ground_true, ground_nominal) = tables
+    if preset.calibration is not None:
+        mav_nominal, ground_nominal = (
+            _stating(errors, table) for table in (mav_nominal, ground_nominal)
+        )
     scale = 1 + signs[4] * errors.depth_scale
     depth_true, registered, measured = _depth_tables(preset, ground_true.camera, scale, errors, rng)
     driven = preset.depth_baseline_m > 0 and preset.depth_registered
@@ -109,6 +114,14 @@ def calibrate(
         CalibrationTable(mav=mav_nominal, ground=GroundTable(**dict(ground_nominal), depth=stated)),
         GroundTable(**dict(ground_nominal), depth=measured) if driven else None,
     )
+
+
+def _stating(errors: CalibrationErrors, nominal: RobotTable) -> RobotTable:
+    """The nominal calibration with the standard deviations of its errors."""
+    camera = nominal.camera.model_copy(update={"time_offset_sigma_ns": errors.time_offset_ns})
+    # Of a turn by one angle about any axis.
+    per_axis = float(errors.camera_to_imu / np.sqrt(3))
+    return nominal.model_copy(update={"mounting_sigma_rad": per_axis, "camera": camera})
 
 
 def _depth_tables(
@@ -121,7 +134,8 @@ def _depth_tables(
     """True depth as measured; nominal depth as registered to the colour camera, and as measured."""
     delay_ns = preset.depth_delay_ns
     true = DepthTable(units_per_m=DEPTH_UNITS_PER_M * scale, delay_ns=delay_ns)
-    registered = DepthTable(units_per_m=DEPTH_UNITS_PER_M, delay_ns=delay_ns)
+    stated = None if preset.calibration is None else errors.depth_scale
+    registered = DepthTable(units_per_m=DEPTH_UNITS_PER_M, scale_sigma=stated, delay_ns=delay_ns)
     if preset.depth_baseline_m <= 0:
         return true, registered, registered
     cameras = _depth_cameras(preset, colour, errors, rng)

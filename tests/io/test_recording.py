@@ -8,7 +8,13 @@ import numpy as np
 import pytest
 
 from airground.core.cloud import Source
-from airground.core.messages import GroundImage, ImuSamples, MagneticSamples, MavImage
+from airground.core.messages import (
+    CalibrationSigmas,
+    GroundImage,
+    ImuSamples,
+    MagneticSamples,
+    MavImage,
+)
 from airground.errors import RecordingError
 from airground.io import layout
 from airground.io.euroc import read_imu, write_imu
@@ -47,6 +53,20 @@ def test_everything_comes_back_as_written(path: Path) -> None:
         np.testing.assert_array_equal(ground.colour, colour)
         expected = np.where(units == 0, np.nan, units / UNITS_PER_M)
         np.testing.assert_allclose(ground.depth, expected, rtol=1e-6)
+
+
+def test_a_header_need_not_state_how_well_the_calibration_is_known(path: Path) -> None:
+    header = path / layout.HEADER
+    assert "sigma" not in header.read_text()
+    assert Recording.open(path).ground.calibration.sigmas == CalibrationSigmas()
+    text = header.read_text().replace(
+        "[calibration.ground.depth]\n", "[calibration.ground.depth]\nscale_sigma = 0.01\n"
+    )
+    header.write_text(text)
+    assert Recording.open(path).ground.calibration.sigmas == CalibrationSigmas(depth_scale=0.01)
+    header.write_text(text.replace("scale_sigma = 0.01", "scale_sigma = -0.01"))
+    with pytest.raises(RecordingError, match="scale_sigma"):
+        Recording.open(path)
 
 
 def test_messages_come_in_order_of_time_and_samples_before_their_image(path: Path) -> None:

@@ -47,6 +47,25 @@ def test_sizes_of_the_errors(preset: SensorPreset, robot: str) -> None:
     assert abs(scale - 1) == pytest.approx(errors.depth_scale)
 
 
+@pytest.mark.parametrize("preset", [NOMINAL, HARSH, PAPER], ids=lambda preset: preset.name)
+def test_the_nominal_calibration_states_how_large_its_errors_are(preset: SensorPreset) -> None:
+    errors, nominal = preset.calibration, drawn(preset).nominal
+    assert errors is not None
+    for robot in (nominal.mav, nominal.ground):
+        sigmas = robot.calibration().sigmas
+        assert sigmas.clock_s == pytest.approx(errors.time_offset_ns * 1e-9)
+        # Three axes of this make a turn of the preset's size.
+        assert sigmas.mounting_rad * np.sqrt(3) == pytest.approx(errors.camera_to_imu)
+    assert nominal.ground.calibration().sigmas.depth_scale == errors.depth_scale
+
+
+def test_the_true_calibration_has_no_errors_to_state() -> None:
+    for robot in (drawn(HARSH).true.mav, drawn(HARSH).true.ground):
+        assert robot.mounting_sigma_rad is None
+        assert robot.camera.time_offset_sigma_ns is None
+    assert drawn(HARSH).true.ground.depth.scale_sigma is None
+
+
 def test_harsh_is_three_times_nominal() -> None:
     assert NOMINAL.calibration is not None
     assert HARSH.calibration is not None
