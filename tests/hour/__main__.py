@@ -57,6 +57,7 @@ def memory_table(watched: Watched, duration_s: float) -> str:
     rows = [(f"{minute}", watched.held_mib(60.0 * minute)) for minute in minutes]
     rows.append(("largest", max((mib for _, mib in watched.memory), default=None)))
     rows.append(("growth after the tenth", watched.growth_mib(SETTLED_S)))
+    rows.append(("after the last image", watched.at_end_mib))
     lines = [f"| {label} | {'-' if mib is None else f'{mib:.0f}'} |" for label, mib in rows]
     return "\n".join(["| minute | memory [MiB] |", "|---|---|", *lines, ""])
 

@@ -28,11 +28,13 @@ class Watched:
     Attributes:
         code: Exit code.
         memory: Recorded time that had passed [s], and memory then, shared pages once [MiB].
+        at_end_mib: The most after the last image, when the results are put together [MiB].
         said: The end of what it printed.
     """
 
     code: int
     memory: list[tuple[float, float]]
+    at_end_mib: float | None
     said: str
 
     def held_mib(self, at_s: float) -> float | None:
@@ -48,7 +50,9 @@ class Watched:
 def watch(words: list[str], duration_s: float) -> Watched:
     """Run `airground WORDS` over a recording of this length, to its end."""
     command = [sys.executable, "-c", CLI, *words]
-    memory, said = [], []
+    memory: list[tuple[float, float]] = []
+    at_end_mib: float | None = None
+    said: list[str] = []
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=ROOT
     ) as process:
@@ -59,9 +63,14 @@ def watch(words: list[str], duration_s: float) -> Watched:
             if match is None:
                 continue
             mib = resident_mib(_processes(process.pid))
-            if mib is not None:
-                memory.append((duration_s * int(match[1]) / int(match[2]), mib))
-    return Watched(process.returncode, memory, "".join(said[-5:]))
+            done, total = int(match[1]), int(match[2])
+            if mib is None:
+                continue
+            if done == total:
+                at_end_mib = max(mib, at_end_mib or 0.0)
+            else:
+                memory.append((duration_s * done / total, mib))
+    return Watched(process.returncode, memory, at_end_mib, "".join(said[-5:]))
 
 
 def _processes(first: int) -> list[int]:

@@ -67,6 +67,36 @@ def test_images_of_a_culled_keyframe_follow_the_one_that_took_them() -> None:
     np.testing.assert_array_equal(after[carried:], before[carried:])
 
 
+def test_poses_are_those_of_a_slow_walk_along_the_chains_of_culled_keyframes() -> None:
+    rng = np.random.default_rng(4)
+    path, keyframes = path_over(12, rng)
+    carried: dict[int, tuple[int, SE3]] = {}
+    hung = {
+        100 * k + n: (k, keyframes[k].state.pose().inverse() @ SE3.from_matrix(pose))
+        for (k, n), pose in zip(
+            ((k, n) for k in range(12) for n in range(IMAGES_EACH)),
+            poses(path, keyframes),
+            strict=True,
+        )
+    }
+    alive = dict(enumerate(keyframes))
+    for _ in range(8):
+        culled, onto = rng.choice(list(alive), 2, replace=False)
+        relative = alive[onto].state.pose().inverse() @ alive[culled].state.pose()
+        carried[int(culled)] = int(onto), relative
+        path.rehang(alive[culled], alive[onto])
+        del alive[culled]
+        for keyframe in alive.values():
+            keyframe.state = keyframe.state.posed(some_pose(rng))
+    for row, (k, relative) in enumerate(hung.values()):
+        while k not in alive:
+            k, before = carried[k]
+            relative = before @ relative
+        expected = (alive[k].state.pose() @ relative).matrix()
+        found = poses(path, list(alive.values()))[row]
+        np.testing.assert_allclose(found, expected, atol=1e-11)
+
+
 def test_many_images_and_a_new_beginning() -> None:
     rng = np.random.default_rng(2)
     path, keyframes = TrackedPath(), [some_keyframe(0, rng)]
