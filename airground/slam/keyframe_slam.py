@@ -333,7 +333,7 @@ class KeyframeSlam:
         close = partial(self._loops.close, frame.depth)
         closed = not self._mapper.found_old and self._follow(close)
         if closed:
-            self._whole.drop()
+            self._whole.loop_closed()
         # Until scale and vertical are known, they are sought by all keyframes.
         if self.settled:
             self._culler.cull(self.inertial)

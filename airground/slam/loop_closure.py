@@ -16,7 +16,7 @@ from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.slam.feature_tracker import FeatureTracker
 from airground.slam.local_mapping import CROWDED
-from airground.slam.map_adjustment import MapAdjuster
+from airground.slam.map_adjustment import FIRST_STEPS, GLOBAL, MOST_AT_ONCE, MapAdjuster
 from airground.slam.pose_graph import MIN_SHARED, Edge, straighten
 from airground.slam.recovery import Found, Recovery
 from airground.slam.rig_state import RigState
@@ -102,7 +102,8 @@ class LoopCloser:
         return bool(drifted and correction.angle() < MAX_TURN)
 
     def _correct(self, found: Found, old: int, depth: F32 | None, inertial: bool) -> bool:
-        """Pose graph, then bundle adjustment of everything; undone if the loop does not fit."""
+        """Pose graph, then bundle adjustment of everything; undone if the loop does not fit. Of a
+        large map only the first steps are taken: `WholeMap.loop_closed` goes on."""
         newest = self.map.keyframes[-1]
         before = MapSnapshot.of(self.map)
         T_map_rig = found.fit.T_map_camera @ self.T_rig_camera.inverse()
@@ -111,7 +112,8 @@ class LoopCloser:
         straighten(self.map, Edge(old, last, T_old_newest, float(len(found.ids))))
         depths = newest.shutter.inverse_depths_at(depth, found.pixels, self.max_depth_m)
         newest.see(found.ids, newest.shutter.straight(found.pixels), depths)
-        self.adjuster.adjust_all(inertial)
+        large = len(self.map.keyframes) > MOST_AT_ONCE
+        self.adjuster.adjust_all(inertial, FIRST_STEPS if large else GLOBAL)
         fitting = np.isin(found.ids, newest.ids) & self.map.mapped(found.ids)
         left = sum(len(keyframe.ids) for keyframe in self.map.keyframes) - fitting.sum()
         if fitting.mean() < MIN_FITTING or left < (1.0 - MAX_LOST) * before.sighting_count():

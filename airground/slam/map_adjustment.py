@@ -21,6 +21,10 @@ WINDOW_DECREASE = 1e-5
 """Adjustment of a window ends when a step lowers the cost by less than this share."""
 GLOBAL = Settings(iterations=15, relative_decrease=1e-6, covariance=False)
 """For a whole map, whose scale moves far for little cost."""
+FIRST_STEPS = Settings(iterations=4, relative_decrease=1e-6, covariance=False)
+"""For a whole map that is adjusted again at once: the beginning shows whether it fits."""
+MOST_AT_ONCE = 64
+"""A map of so many keyframes is adjusted at once: 45 ms of processor time for 62, 82 ms for 89."""
 
 FIRST_ALL = 8
 ALL_GROWTH = 1.5
@@ -78,11 +82,11 @@ class MapAdjuster:
         settings = Settings(self.parameters.iterations, relative_decrease=WINDOW_DECREASE)
         return self._adjust(fixed + free, roles, inertial, settings)
 
-    def adjust_all(self, inertial: bool) -> None:
+    def adjust_all(self, inertial: bool, settings: Settings = GLOBAL) -> None:
         """Move the whole map, as `whole_map` has it."""
         keyframes = self.map.keyframes
         self.settle(keyframes[-1])
-        self._adjust(list(range(len(keyframes))), self._roles(inertial), inertial, GLOBAL)
+        self._adjust(list(range(len(keyframes))), self._roles(inertial), inertial, settings)
 
     def whole_map(self, inertial: bool) -> MapProblem:
         """The whole map as it is, to be adjusted with the settings `GLOBAL`.

@@ -12,12 +12,9 @@ import numpy as np
 
 from airground.core.arrays import F64
 from airground.slam.bundle_adjustment import Adjustment, Pieces, States, adjusting
-from airground.slam.map_adjustment import GLOBAL, MapAdjuster
+from airground.slam.map_adjustment import GLOBAL, MOST_AT_ONCE, MapAdjuster
 from airground.slam.rig_state import RigState
 from airground.slam.sparse_map import SparseMap
-
-MOST_AT_ONCE = 64
-"""A map of so many keyframes is adjusted at once: 45 ms of processor time for 62, 82 ms for 89."""
 
 
 @dataclass(eq=False)
@@ -41,6 +38,11 @@ class WholeMap:
         self.drop()
         self.adjuster.adjust_all(inertial)
         return True
+
+    def loop_closed(self) -> None:
+        """A loop was closed: the adjustment of a large map goes on from the next image on."""
+        self.drop()
+        self._due = len(self.map.keyframes) > MOST_AT_ONCE
 
     def begin(self, inertial: bool) -> bool:
         """Adjust a small map at once, and a large one from the next image on, unless that is under

@@ -53,7 +53,13 @@ def _image_width(material: Material, width_px: float) -> Work:
         return replace(view, image=image.astype(np.uint8))
 
     views = [shrunk(view) for view in sweep.views]
-    small = Sweep(resized(sweep.camera, *size), shrunk(sweep.reference), views, sweep.config)
+    small = Sweep(
+        resized(sweep.camera, *size),
+        shrunk(sweep.reference),
+        views,
+        sweep.config,
+        sweep.depth_range,
+    )
     return Work(small.add_next, small.make_ready)
 
 

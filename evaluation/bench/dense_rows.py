@@ -20,7 +20,6 @@ from airground.dense.ray_casting import cast_surface, surface_cloud
 from airground.dense.scene_extent import scene_extent
 from airground.dense.view_selection import AFTER, BEFORE, PosedImage
 from airground.dense.volume import Volume
-from airground.errors import InputError
 from airground.ground_map import GroundMap
 from airground.ground_map.surface_points import surface_points
 from evaluation.bench import floors
@@ -32,15 +31,22 @@ DECODED = 60
 
 
 class Sweep:
-    """One depth map under construction, view after view in order of time, as the pipeline does."""
+    """One depth map under construction, view after view in order of time, as the pipeline does.
+    `depth_range` is that of the scene before the reference [m]."""
 
     def __init__(
-        self, camera: PinholeCamera, reference: PosedImage, views: list[PosedImage], config: Config
+        self,
+        camera: PinholeCamera,
+        reference: PosedImage,
+        views: list[PosedImage],
+        config: Config,
+        depth_range: tuple[float, float],
     ) -> None:
+        self.depth_range = depth_range
         before = [view for view in views if view.stamp_ns < reference.stamp_ns]
-        extent = scene_extent(reference, before or views, camera)
-        if extent is None:
-            raise InputError("the views show too little texture for the depth of the scene")
+        # The first views may be close together, and then do not show how deep the scene is.
+        extent = scene_extent(reference, before or views, camera, depth_range)
+        assert extent is not None
         self.camera, self.reference, self.views, self.config = camera, reference, views, config
         self.sides = 2 if config.view_selection.both_sides else 1
         # A depth map has half of the image's width and height.
@@ -89,7 +95,8 @@ class Sweep:
 
 
 def sweep_of(material: Material, config: Config) -> Sweep:
-    return Sweep(material.mav_camera, material.reference, material.views, config)
+    views = material.reference, material.views
+    return Sweep(material.mav_camera, *views, config, material.depth_range())
 
 
 def with_paper_planes(config: Config) -> Config:

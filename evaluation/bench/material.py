@@ -82,6 +82,11 @@ class Material:
         """The depth map whose view spans the volume."""
         return self.depth_maps[len(self.depth_maps) // 2]
 
+    def depth_range(self) -> tuple[float, float]:
+        """Nearest and farthest depth of that depth map [m]."""
+        depth = self.reference_depth.depth
+        return float(np.nanmin(depth)), float(np.nanmax(depth))
+
     @property
     def ground_cloud(self) -> PointCloud:
         return self.sighting.ground_cloud

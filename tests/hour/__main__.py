@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import tempfile
 import time
@@ -53,9 +54,11 @@ def main() -> int:
 
 def memory_table(watched: Watched, duration_s: float) -> str:
     """Memory after the first minute and every tenth, and how it grew after the tenth."""
-    minutes = [1, *range(10, int(duration_s / 60) + 1, 10)]
+    minutes = [1, *range(10, math.ceil(duration_s / 60), 10)]
     rows = [(f"{minute}", watched.held_mib(60.0 * minute)) for minute in minutes]
-    rows.append(("largest", max((mib for _, mib in watched.memory), default=None)))
+    rows.append(
+        ("largest before the last image", max((m for _, m in watched.memory), default=None))
+    )
     rows.append(("growth after the tenth", watched.growth_mib(SETTLED_S)))
     rows.append(("after the last image", watched.at_end_mib))
     lines = [f"| {label} | {'-' if mib is None else f'{mib:.0f}'} |" for label, mib in rows]

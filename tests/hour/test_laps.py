@@ -91,12 +91,13 @@ def test_a_recording_of_laps_is_whole(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_what_is_beyond_a_limit_is_said() -> None:
     memory = [(60.0 * minute, 1000.0 + min(minute, 12)) for minute in range(61)]
-    good = Watched(0, memory, "")
+    good = Watched(0, memory, 1300.0, "")
     fine = Poses(np.array([20.0, 30.0]), 0, 0.001)
     assert failed(good, {"mav": fine}) == []
     assert good.growth_mib(600.0) == 2.0
-    assert "| 60 | 1012 |" in memory_table(good, 3600.0)
-    grown = Watched(0, [*memory, (3601.0, 1061.0)], "")
+    assert "| 50 | 1012 |" in memory_table(good, 3600.0)
+    assert "| after the last image | 1300 |" in memory_table(good, 3600.0)
+    grown = Watched(0, [*memory, (3601.0, 1061.0)], None, "")
     late = Poses(np.array([20.0, 101.0]), 3, 0.001)
     said = failed(grown, {"mav": fine, "ground": late})
     assert said == [
@@ -108,7 +109,7 @@ def test_what_is_beyond_a_limit_is_said() -> None:
 
 
 def test_a_short_flight_says_nothing_of_growth() -> None:
-    assert Watched(0, [(60.0, 1000.0), (120.0, 1200.0)], "").growth_mib(600.0) is None
+    assert Watched(0, [(60.0, 1000.0), (120.0, 1200.0)], None, "").growth_mib(600.0) is None
 
 
 def test_the_motion_of_a_seed_is_the_same(laps: Laps) -> None:

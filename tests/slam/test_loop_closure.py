@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from airground.config import Config
 from airground.core.messages import GroundImage
 from airground.core.se3 import SE3
-from airground.slam import loop_closure
+from airground.slam import loop_closure, spread_adjustment
 from airground.slam.front_end import TrackedPose
 from airground.slam.geometry.descriptors import describe
 from airground.slam.keyframe_slam import KeyframeSlam
@@ -88,7 +88,13 @@ def off_m(sequence: Sequence, tracked: list[TrackedPose]) -> NDArray[np.float64]
 
 
 @pytest.mark.slow
-def test_a_map_that_slipped_is_straightened_when_the_robot_returns() -> None:
+@pytest.mark.parametrize("large", [False, True], ids=["at once", "spread over images"])
+def test_a_map_that_slipped_is_straightened_when_the_robot_returns(
+    large: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if large:
+        monkeypatch.setattr(loop_closure, "MOST_AT_ONCE", 0)
+        monkeypatch.setattr(spread_adjustment, "MOST_AT_ONCE", 0)
     sequence = ground_sequence(FRAMES_AROUND, 10.0, 1.0)
     front_end, slam = robot(sequence)
     slipped: list[int] = []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -45,6 +46,17 @@ def _small_flight() -> Iterator[None]:
         patch.setattr(simulation_rows, "DURATION_S", 8.0)
         yield
     simulation_rows.simulated.cache_clear()
+
+
+def test_views_at_one_place_do_not_show_the_depth_and_are_swept_all_the_same(
+    material: Material,
+) -> None:
+    here = material.reference.T_mav_camera
+    views = [replace(view, T_mav_camera=here) for view in material.views]
+    work = dense_rows.add_frame(replace(material, views=views))
+    take_turn(work)
+    near_m, far_m = material.depth_range()
+    assert 0 < near_m < far_m
 
 
 def test_two_rows_are_timed_on_both_lanes_with_their_peers(material: Material) -> None:
