@@ -54,7 +54,7 @@ def test_views_at_one_place_do_not_show_the_depth_and_are_swept_all_the_same(
     here = material.reference.T_mav_camera
     views = [replace(view, T_mav_camera=here) for view in material.views]
     work = dense_rows.add_frame(replace(material, views=views))
-    take_turn(work)
+    take_turn(work, 0.0)
     near_m, far_m = material.depth_range()
     assert 0 < near_m < far_m
 
