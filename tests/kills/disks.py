@@ -49,7 +49,11 @@ def try_often(verb: str, folder: Path, count: int, seed: int) -> int:
     rng = np.random.default_rng([seed, sorted(SAME).index(verb)])
     good = Command(commands(folder)[verb], folder / f"{verb}-good")
     good.folder.mkdir()
-    whole_s = good.finish()
+    good.finish()
+    # How long it takes when nothing is compiled any more.
+    warm = Command(good.words, folder / f"{verb}-warm")
+    warm.folder.mkdir()
+    whole_s = warm.finish()
     need = sum(path.stat().st_size for path in good.folder.rglob("*") if path.is_file())
     lost = 0
     for trouble in TROUBLES:
@@ -74,7 +78,8 @@ def try_often(verb: str, folder: Path, count: int, seed: int) -> int:
 
 
 def suffer(victim: Command, trouble: str, need: int, share: float, whole_s: float) -> int:
-    """Exit code of a command in trouble; `share` of 0 to 1 says how much fits, or when."""
+    """Exit code of a command in trouble; `share` of 0 to 1 says how much fits, or when.
+    A command that ended before its folder could vanish keeps it."""
     if trouble == "full":
         remount(victim.folder, f"size={int(need * (0.02 + 0.9 * share))}")
     elif trouble == "read-only":
@@ -82,6 +87,8 @@ def suffer(victim: Command, trouble: str, need: int, share: float, whole_s: floa
     process = victim.start()
     if trouble == "vanishes":
         time.sleep((0.2 + 0.7 * share) * whole_s)
+        if process.poll() is not None:
+            return process.returncode
         for path in victim.folder.iterdir():
             if path.name != "tmp":
                 shutil.rmtree(path, ignore_errors=True)
