@@ -5,26 +5,39 @@ from __future__ import annotations
 import re
 import reprlib
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import tomli_w
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from airground.errors import RecordingError
 from airground.io.calibration import CalibrationTable, Table
 from airground.io.input_files import read_toml_text
 
 SCHEMA = 1
+NAMES = {"mav": "MAV", "ground": "ground robot"}
+"""The robots in words."""
 _NUMBERS = re.compile(r"\[\s+([-+.\deE,\s]+?)\s+\]")  # an array of numbers over many lines
 _SHORT = reprlib.Repr()
 _SHORT.maxlevel, _SHORT.maxlist, _SHORT.maxstring, _SHORT.maxother = 2, 16, 60, 60
 
 
 class FrameCounts(Table):
-    """How many images each camera took."""
+    """How many images each camera took; 0 of a robot that was not recorded."""
 
-    mav: Annotated[int, Field(ge=1)]
-    ground: Annotated[int, Field(ge=1)]
+    mav: Annotated[int, Field(ge=0)]
+    ground: Annotated[int, Field(ge=0)]
+
+    @model_validator(mode="after")
+    def _any(self) -> FrameCounts:
+        if not self.robots():
+            raise ValueError("one robot at least must have images")
+        return self
+
+    def robots(self) -> tuple[Literal["mav", "ground"], ...]:
+        """The robots that were recorded."""
+        counts: dict[Literal["mav", "ground"], int] = {"mav": self.mav, "ground": self.ground}
+        return tuple(robot for robot, count in counts.items() if count)
 
 
 class Header(Table):
@@ -37,7 +50,7 @@ class Header(Table):
         dials: What was turned away from the scene's file and the preset, by name; None for nothing.
         duration_s: Length of the recording [s].
         frames: Numbers of images.
-        calibration: Nominal calibration of the sensors.
+        calibration: Nominal calibration of the sensors, of both robots even if one was recorded.
         digests: SHA-256 of every text file and image folder by relative path.
     """
 
@@ -51,6 +64,15 @@ class Header(Table):
     frames: FrameCounts
     calibration: CalibrationTable
     digests: dict[str, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]]
+
+    def facts(self) -> str:
+        """What was recorded, in a line."""
+        robots = self.frames.robots()
+        alone = f", {NAMES[robots[0]]} alone" if len(robots) == 1 else ""
+        return (
+            f"{self.scene}, seed {self.seed}, flight {self.flight}, "
+            f"{self.sensors} sensors, {self.duration_s:g} s{alone}"
+        )
 
 
 def read_header(path: Path) -> Header:

@@ -3,6 +3,7 @@
 HEADER = "recording.toml"
 TRUTH = "truth"
 
+MAV = "mav0"
 MAV_CAMERA = "mav0/cam0"
 MAV_CAMERA_LIST = f"{MAV_CAMERA}/data.csv"
 MAV_IMAGES = f"{MAV_CAMERA}/data"
@@ -11,6 +12,7 @@ MAV_IMU_DATA = f"{MAV_IMU}/data.csv"
 MAV_MAGNETOMETER = "mav0/mag0"
 MAV_MAGNETOMETER_DATA = f"{MAV_MAGNETOMETER}/data.csv"
 
+GROUND = "ground"
 GROUND_COLOUR = "ground/rgb"
 GROUND_DEPTH = "ground/depth"
 GROUND_COLOUR_LIST = "ground/rgb.txt"

@@ -14,6 +14,7 @@ from airground.io.plain_euroc import euroc_folder, open_euroc
 from airground.io.plain_seven_scenes import is_seven_scenes_folder, open_seven_scenes
 from airground.io.plain_tum import open_tum
 from airground.io.recording import Recording
+from airground.io.recording_folder import RecordingFolder
 from airground.io.robot_recording import Pair, RobotRecording
 from airground.io.tum_lists import is_tum_folder
 
@@ -98,7 +99,7 @@ def open_robot(
     _check_options(path, kind, calibration_file, depth_units_per_m, topics)
     match kind:
         case "airground":
-            return Recording.open(path).of(robot)
+            return RecordingFolder.open(path).of(robot)
         case "euroc" if robot == Source.MAV:
             return open_euroc(path, calibration_file)
         case "euroc":

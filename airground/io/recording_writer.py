@@ -24,17 +24,12 @@ def ground_image_name(stamp_ns: int) -> str:
     return f"{format_stamp(stamp_ns)}.png"
 
 
-def make_folders(root: Path) -> None:
-    """Create every folder of an empty recording."""
-    folders = (layout.MAV_IMU, layout.MAV_MAGNETOMETER, layout.GROUND_IMU)
-    for folder in (*layout.IMAGE_FOLDERS, *folders, layout.GROUND_MAGNETOMETER):
-        (root / folder).mkdir(parents=True)
-
-
 def write_mav(
     root: Path, nominal: RobotTable, stamps_ns: I64, imu: ImuSamples, magnetic: MagneticSamples
 ) -> None:
-    """Write the MAV's samples, image list and `sensor.yaml` files (EuRoC)."""
+    """Make the MAV's folders; write its samples, image list and `sensor.yaml` files (EuRoC)."""
+    for folder in (layout.MAV_IMAGES, layout.MAV_IMU, layout.MAV_MAGNETOMETER):
+        (root / folder).mkdir(parents=True)
     names = [mav_image_name(int(stamp)) for stamp in stamps_ns]
     write_image_list(root / layout.MAV_CAMERA_LIST, stamps_ns, names)
     yaml = camera_yaml(nominal.camera, SE3.from_matrix(nominal.T_imu_camera))
@@ -45,7 +40,11 @@ def write_mav(
 def write_ground(
     root: Path, nominal: RobotTable, stamps_ns: I64, imu: ImuSamples, magnetic: MagneticSamples
 ) -> None:
-    """Write the ground robot's samples and image lists (TUM RGB-D, samples also EuRoC)."""
+    """Make the ground robot's folders; write its samples and image lists (TUM RGB-D, samples also
+    EuRoC)."""
+    images = layout.GROUND_COLOUR, layout.GROUND_DEPTH
+    for folder in (*images, layout.GROUND_IMU, layout.GROUND_MAGNETOMETER):
+        (root / folder).mkdir(parents=True)
     names = [ground_image_name(int(stamp)) for stamp in stamps_ns]
     write_image_lists(root / "ground", stamps_ns, names)
     write_accelerometer(root / layout.GROUND_ACCELEROMETER, imu)

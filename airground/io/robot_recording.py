@@ -157,12 +157,7 @@ class Pair:
 
     def __post_init__(self) -> None:
         assert (self.mav.robot, self.ground.robot) == (Source.MAV, Source.GROUND)
-        late_ns = int(self.ground.camera_stamps[0] - self.mav.camera_stamps[-1])
-        if late_ns > 0:
-            raise RecordingError(
-                f"{self.ground.path}: begins {late_ns / 1e9:.1f} s after {self.mav.path} ended; "
-                "both must be stamped by the same clock, and the ground robot must come first"
-            )
+        check_same_clock(self.mav, self.ground)
 
     def of(self, robot: Source) -> RobotRecording[Any]:
         return self.mav if robot == Source.MAV else self.ground
@@ -186,3 +181,13 @@ class Pair:
             streams = [self.of(robot).bundles(pool, dropped.get(robot, ())) for robot in robots]
             for _, bundle in heapq.merge(*streams, key=itemgetter(0)):
                 yield from bundle
+
+
+def check_same_clock(mav: RobotRecording[Any], ground: RobotRecording[Any]) -> None:
+    """RecordingError if the ground robot begins after the MAV has ended."""
+    late_ns = int(ground.camera_stamps[0] - mav.camera_stamps[-1])
+    if late_ns > 0:
+        raise RecordingError(
+            f"{ground.path}: begins {late_ns / 1e9:.1f} s after {mav.path} ended; "
+            "both must be stamped by the same clock, and the ground robot must come first"
+        )

@@ -20,6 +20,7 @@ from evaluation.commands.options import (
     in_megabytes,
     in_range,
     on_disk,
+    render_s,
     work_s,
 )
 from evaluation.setup.console import EXIT_FAULT_FOUND, EXIT_OK
@@ -72,10 +73,17 @@ class Simulate(BenchmarkOptions, DatasetOptions, SensorOption, SeedOption, OutOp
     """flight over the same heap: other waypoints, other noise"""
     dials: Annotated[UseAppendAction[tuple[str, ...]], arg(name="dial"), Shown("NAME=VALUE")] = ()
     """turn scene or sensors (docs/sweep.md), as in sensors.readout_ms=20; repeatable"""
+    only: Annotated[Literal["mav", "ground"] | None, Shown("{mav,ground}", "both robots")] = None
+    """record one robot alone, with the bytes that it has beside the other; for track, export,
+    inspect and render"""
 
     def main(self) -> None:
         if self.duration_s is not None:
             in_range("--duration-s", self.duration_s, low=1.0)
+        if self.only and (self.level or self.seeds or self.sealed):
+            raise InputError(
+                f"--only {self.only}: for one recording, not with --seeds, --level or --sealed"
+            )
         if self.level is not None:
             self._make_benchmark(self.level)
         elif self.seeds is None:
@@ -85,11 +93,13 @@ class Simulate(BenchmarkOptions, DatasetOptions, SensorOption, SeedOption, OutOp
 
     def _record_one(self) -> None:
         from airground.config import Config
+        from airground.io.header import NAMES
         from evaluation.datasets.sealed import record_sealed
         from evaluation.measure.plans.dials import Subject, parse_dials, turned
         from evaluation.setup.output import check_free
         from evaluation.setup.progress import announce, step
         from sim.recording.recorder import Flight, record
+        from sim.robots.motion import ROBOTS
         from sim.scene import load_scene
         from sim.sensors.presets import sensor_preset
 
@@ -104,10 +114,10 @@ class Simulate(BenchmarkOptions, DatasetOptions, SensorOption, SeedOption, OutOp
         flight = int(in_range("--flight", self.flight))
         check_free(self.out)
         seconds, every = self.duration_s or scene.duration_s, subject.sensors.every
-        expected_s = work_s(seconds * RENDER_S_PER_S / every, self.workers())
-        announce(
-            f"records {seconds:.0f} s over {scene.name}, {on_disk(seconds, every)}", expected_s
-        )
+        expected_s = work_s(render_s(seconds, every, self.only), self.workers())
+        who = f" of the {NAMES[self.only]} alone" if self.only else ""
+        size = on_disk(seconds, every, self.only)
+        announce(f"records {seconds:.0f} s{who} over {scene.name}, {size}", expected_s)
         if self.sealed is not None:
             asked_for = Flight(scene, seed, flight, subject.sensors, self.duration_s, dials)
             record_sealed(asked_for, self.out, self.sealed, self.workers())
@@ -122,6 +132,7 @@ class Simulate(BenchmarkOptions, DatasetOptions, SensorOption, SeedOption, OutOp
                 self.workers(),
                 flight=flight,
                 dials=dials,
+                robots=(self.only,) if self.only else ROBOTS,
                 progress=rendering.move_to,
             )
 
@@ -178,7 +189,9 @@ class Render(Verb):
     """folder that simulate has written"""
     add: Annotated[str, Shown("LIST")]
     """what to add, of depth, normals, segmentation, flow, lidar, stereo; as in depth,flow"""
-    robot: Literal["mav", "ground", "both"] = "both"
+    robot: Annotated[
+        Literal["mav", "ground", "both"] | None, Shown("{mav,ground,both}", "those recorded")
+    ] = None
     """robot whose images are rendered"""
     every: Annotated[int, Shown("N")] = 1
     """every so many-th image or scan; flow leads to the next of all images"""
@@ -208,11 +221,9 @@ class Render(Verb):
         from sim.robots.motion import ROBOTS
         from sim.sensors.lidar import Lidar
 
-        robots = ROBOTS if self.robot == "both" else (self.robot,)
         every = int(in_range("--every", self.every, low=1))
         added = parse_modalities(self.add)
-        wanted = Wanted(robots, tuple(name for name in added if name in MODALITIES), every)
-        if LIDAR in added and "ground" not in robots:
+        if LIDAR in added and self.robot == "mav":
             raise InputError("--add lidar: the ground robot carries it; give no --robot mav")
         if self.beams is not None and LIDAR not in added:
             raise InputError("--beams: only with --add lidar")
@@ -222,6 +233,10 @@ class Render(Verb):
         in_range("--baseline", baseline_m, low=0.001, high=5.0)
         lidar = Lidar() if self.beams is None else Lidar(beams=self.beams)
         simulated = Simulated.open(self.recording)
+        asked = {None: simulated.robots, "both": ROBOTS, "mav": ("mav",), "ground": ("ground",)}
+        robots = asked[self.robot]
+        simulated.check_recorded((*robots, "ground") if LIDAR in added else robots)
+        wanted = Wanted(robots, tuple(name for name in added if name in MODALITIES), every)
         out = simulated.truth.folder if self.out is None else self.out
         if wanted.modalities:
             with step("rendering", count_images(simulated, wanted), "images") as rendering:
@@ -290,15 +305,17 @@ class Export(OutOption, Verb):
     """robot whose sensors are written"""
 
     def main(self) -> None:
-        from evaluation.datasets.formats import FORMATS, robots_for
+        from evaluation.datasets.formats import FORMATS, robots_for, robots_in
         from evaluation.datasets.simulated import Simulated
         from evaluation.setup.output import check_free, fresh_folder
         from evaluation.setup.progress import announce, step
 
-        robots, chosen = robots_for(self.format, self.robot), FORMATS[self.format]
+        chosen = FORMATS[self.format]
+        robots_for(self.format, self.robot)  # before the recording is read
         check_free(self.out)
         with step("comparing digests"):
             simulated = Simulated.open(self.recording)
+        robots = robots_in(simulated, self.format, self.robot)
         announce(f"writes {self.format}, {in_megabytes(chosen.expected_mb(simulated, robots))}")
         with fresh_folder(self.out) as folder, step(f"writing {self.format}"):
             chosen.write(folder, simulated, robots)

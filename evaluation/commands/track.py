@@ -85,12 +85,17 @@ class Track(FolderOptions, ConfigOptions, SeedOption, OutOption, Verb):
             InputError: The layout does not say which.
         """
         from airground.core.cloud import Source
+        from airground.io.header import read_header
+        from airground.io.layout import HEADER
         from airground.io.open_recording import layout_of
 
         if self.robot is not None:
             return Source[self.robot.upper()]
         match layout_of(self.folder):
             case "airground":
+                robots = read_header(self.folder / HEADER).frames.robots()
+                if len(robots) == 1:
+                    return Source[robots[0].upper()]
                 raise InputError(
                     f"{self.folder}: holds both robots; give --robot mav or --robot ground"
                 )

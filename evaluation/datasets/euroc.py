@@ -42,7 +42,8 @@ def write_euroc_folder(folder: Path, simulated: Simulated, robots: tuple[Robot, 
         shutil.copyfile(recording.path / sensor / "data.csv", folder / sensor / "data.csv")
         yaml = (recording.path / sensor / "sensor.yaml").read_text(encoding="utf-8")
         _write_yaml(folder / sensor / "sensor.yaml", yaml)
-    comment = f"airground {recording.scene}, seed {recording.seed}, flight {recording.flight}"
+    header = recording.header
+    comment = f"airground {header.scene}, seed {header.seed}, flight {header.flight}"
     _write_yaml(folder / "mav0" / "body.yaml", f"comment: {comment}\n")
     state = folder / "mav0" / "state_groundtruth_estimate0"
     state.mkdir()

@@ -81,3 +81,16 @@ def robots_for(name: str, asked: str | None) -> Robots:
     if robots not in chosen.possible:
         raise InputError(f"--robot {asked}: not with --format {name}: {chosen.because}")
     return robots
+
+
+def robots_in(simulated: Simulated, name: str, asked: str | None) -> Robots:
+    """As `robots_for`; by default the one robot of a recording that has no other.
+
+    Raises:
+        InputError: The format cannot hold them, or one was not recorded.
+    """
+    robots, there = robots_for(name, asked), simulated.robots
+    if asked is None and len(there) == 1 and there in FORMATS[name].possible:
+        return there
+    simulated.check_recorded(robots)
+    return robots

@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from airground.core.cloud import Source
 from airground.core.messages import ImuSamples, MagneticSamples
 from airground.core.se3 import SE3
 from airground.errors import InputError, RecordingError
 from airground.io.calibration import RobotTable
 from airground.io.image_files import ImageFiles
 from airground.io.layout import HEADER
-from airground.io.recording import Recording
+from airground.io.recording_folder import RecordingFolder
 from airground.io.robot_recording import RobotRecording
 from sim.recording.truth import Truth
 from sim.robots.motion import Robot
@@ -25,9 +26,9 @@ from sim.robots.robot_motion import RobotMotion
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """What both robots sensed, the truth, and the files of the images."""
+    """What one robot or both sensed, the truth, and the files of the images."""
 
-    recording: Recording
+    recording: RecordingFolder
     truth: Truth
     files: ImageFiles
 
@@ -43,11 +44,11 @@ class Simulated:
                 f"{path}: has no {HEADER}; only recordings that simulate has written have all "
                 "that other formats need, their truth above all"
             )
-        recording = Recording.open(path)
+        recording = RecordingFolder.open(path)
         recording.verify()
         assert isinstance(recording.images, ImageFiles)
         truth = Truth.open(path)
-        for robot in (recording.mav, recording.ground):
+        for robot in recording.robots.values():
             assert robot.imu is not None
             if not np.array_equal(robot.imu.stamps_ns, truth.motion.stamps_ns):
                 raise RecordingError(
@@ -55,8 +56,19 @@ class Simulated:
                 )
         return cls(recording, truth, recording.images)
 
+    @property
+    def robots(self) -> tuple[Robot, ...]:
+        """The robots that were recorded."""
+        return self.recording.header.frames.robots()
+
+    def check_recorded(self, robots: Sequence[Robot]) -> None:
+        """RecordingError if one of the robots was not recorded."""
+        for robot in robots:
+            self.sensed(robot)
+
     def sensed(self, robot: Robot) -> RobotRecording[Any]:
-        return self.recording.mav if robot == "mav" else self.recording.ground
+        """What a robot sensed; RecordingError if it was not recorded."""
+        return self.recording.of(Source[robot.upper()])
 
     def nominal(self, robot: Robot) -> RobotTable:
         """The nominal calibration, which the pipeline uses."""

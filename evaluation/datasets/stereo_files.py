@@ -98,7 +98,13 @@ def flight_of(header: Header, scene: str | None) -> Flight:
     dials = header.dials or {}
     subject = turned(Subject(loaded, preset, Config()), dials)
     return Flight(
-        subject.scene, header.seed, header.flight, subject.sensors, header.duration_s, header.dials
+        subject.scene,
+        header.seed,
+        header.flight,
+        subject.sensors,
+        header.duration_s,
+        header.dials,
+        header.frames.robots(),
     )
 
 

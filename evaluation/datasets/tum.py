@@ -36,9 +36,10 @@ def write_tum_folder(folder: Path, simulated: Simulated, robots: tuple[Robot, ..
     """
     assert robots == ("ground",)
     recording = simulated.recording
-    if recording.depth_units_per_m != DEPTH_UNITS_PER_M:
+    units_per_m = recording.header.calibration.ground.depth.units_per_m
+    if units_per_m != DEPTH_UNITS_PER_M:
         raise InputError(
-            f"{recording.path}: a metre of depth is {recording.depth_units_per_m:g} in its PNG "
+            f"{recording.path}: a metre of depth is {units_per_m:g} in its PNG "
             f"files; TUM's format prescribes {DEPTH_UNITS_PER_M:g}"
         )
     copy_images(simulated.files.ground_colour_files, folder / "rgb")

@@ -39,7 +39,7 @@ def write_exposure(recording: Path, images: Mapping[Robot, Sequence[tuple[int, E
     rows = [
         [robot, stamp_ns, f"{exposure.exposure_s:.9f}", f"{exposure.gain:.6f}"]
         for robot in ROBOTS
-        for stamp_ns, exposure in images[robot]
+        for stamp_ns, exposure in images.get(robot, ())
     ]
     with _file(recording).open("w", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerows([_COLUMNS, *rows])

@@ -169,10 +169,10 @@ class FrameServer:
 
 
 def _tasks(plan: FramePlan) -> list[Task]:
-    """Runs of frames of both robots, taken in turn."""
+    """Runs of frames of all robots, taken in turn."""
     tasks: list[Task] = []
-    for robot in ROBOTS:
-        count = len(plan.frames[robot].stamps_ns)
+    for robot, frames in plan.frames.items():
+        count = len(frames.stamps_ns)
         for first in range(0, count, FRAMES_PER_TASK):
             tasks.append((robot, first, min(first + FRAMES_PER_TASK, count)))
     return sorted(tasks, key=lambda task: task[1])

@@ -56,7 +56,8 @@ class FramePlan:
         true: True calibration of the sensors.
         driver: Nominal calibration by which depth is registered; None if it is not.
         taken_ns: Nominal stamps at which each robot's camera takes an image [ns].
-        frames: The frames that are left of them by faults of the sensors.
+        frames: The frames that are left of them by faults of the sensors, of the robots that are
+            recorded.
         exposures: Courses of the cameras' automatic exposure; none if exposure is fixed.
     """
 

@@ -18,7 +18,7 @@ from sim.recording.bodies_in_view import BodiesInView
 from sim.recording.exposure_truth import write_exposure
 from sim.recording.frames import FramePlan, WorldFiles
 from sim.recording.render import Renderer
-from sim.robots.motion import ROBOTS, Motion, Robot
+from sim.robots.motion import Motion, Robot
 from sim.robots.moving_bodies import MovingBody, read_bodies
 from sim.sensors.auto_exposure import ExposureCourse, regulate
 
@@ -55,7 +55,7 @@ def with_exposure(plan: FramePlan) -> FramePlan:
         return plan
     courses: dict[Robot, ExposureCourse] = {}
     with _LightMeter(plan) as meter:
-        for robot in ROBOTS:
+        for robot in plan.frames:
             times_ns = _image_times(plan, robot)
             every = times_ns[[*range(0, len(times_ns) - 1, EVERY), len(times_ns) - 1]]
             metered = np.array([meter.histogram(robot, int(time_ns)) for time_ns in every])

@@ -72,6 +72,7 @@ class Flight:
     sensors: SensorPreset
     duration_s: float | None = None
     dials: Mapping[str, float] | None = None
+    robots: tuple[Robot, ...] = ROBOTS
 
 
 def record(
@@ -84,6 +85,7 @@ def record(
     *,
     flight: int = 0,
     dials: Mapping[str, float] | None = None,
+    robots: tuple[Robot, ...] = ROBOTS,
     progress: Progress | None = None,
 ) -> Path:
     """Record one flight over a scene; the same arguments give the same bytes.
@@ -97,6 +99,7 @@ def record(
         workers: Number of processes that render; one per usable core if None.
         flight: Number of the flight over the same heap.
         dials: What has been turned in scene and preset, for the header.
+        robots: Robots that are recorded; each one's bytes are the same with and without the other.
         progress: Consumer of the rendering's progress.
 
     Raises:
@@ -110,7 +113,7 @@ def record(
     out = Path(out)
     if out.exists():
         raise InputError(f"{out}: already exists; name a folder that does not")
-    what = Flight(scene, seed, flight, preset, duration_s, dials)
+    what = Flight(scene, seed, flight, preset, duration_s, dials, robots)
     try:
         with partial_folder(out) as temporary, frame_workers(workers) as pool:
             header, plan, plain = write_all_but_images(temporary, what)
@@ -194,17 +197,18 @@ def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan,
         robot: _within(motion, image_stamps(motion.stamps_ns, first)[:: preset.every], preset)
         for robot, first in FIRST_IMAGE_NS.items()
     }
-    frames = {r: FaultyFrames.of(taken[r], of_robot(faults, r)) for r in taken}
-    recording_writer.make_folders(root)
+    frames = {r: FaultyFrames.of(taken[r], of_robot(faults, r)) for r in flight.robots}
     bodies = moving_bodies(scene, world, motion)
     write_truth(root, world, flown, motion, sensors.true, faults, bodies)
     nominal = sensors.nominal
-    own = of_robot(faults, "mav")
-    mav_samples = _samples(motion.stamps_ns, motion.mav, preset, own, mav_rng)
-    own = of_robot(faults, "ground")
-    ground_samples = _samples(motion.stamps_ns, motion.ground, preset, own, ground_rng)
-    recording_writer.write_mav(root, nominal.mav, frames["mav"].stamps_ns, *mav_samples)
-    recording_writer.write_ground(root, nominal.ground, frames["ground"].stamps_ns, *ground_samples)
+    rngs: dict[Robot, np.random.Generator] = {"mav": mav_rng, "ground": ground_rng}
+    for robot, left in frames.items():
+        own = of_robot(faults, robot)
+        samples = _samples(motion.stamps_ns, motion.robot(robot), preset, own, rngs[robot])
+        if robot == "mav":
+            recording_writer.write_mav(root, nominal.mav, left.stamps_ns, *samples)
+        else:
+            recording_writer.write_ground(root, nominal.ground, left.stamps_ns, *samples)
     plan = FramePlan(
         recording=root,
         worlds=_world_files(root, one=flown is world),
@@ -226,7 +230,7 @@ def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan,
         sensors=preset.name,
         dials=dict(flight.dials) if flight.dials else None,
         duration_s=motion.duration_s,
-        frames=FrameCounts(**{robot: len(left.stamps_ns) for robot, left in frames.items()}),
+        frames=FrameCounts(**{r: len(frames[r].stamps_ns) if r in frames else 0 for r in ROBOTS}),
         calibration=nominal,
         digests={},
     )

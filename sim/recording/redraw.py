@@ -11,7 +11,7 @@ import numpy as np
 from airground.core.scratch_folder import ScratchFolder
 from airground.errors import AirgroundError, InputError
 from airground.io.layout import TRUTH
-from airground.io.recording import Recording
+from airground.io.recording_folder import RecordingFolder
 from sim.recording.frames import FrameMaker, FramePlan
 from sim.recording.recorder import Flight, with_models, write_all_but_images
 from sim.recording.truth import Truth
@@ -24,7 +24,9 @@ _OTHERS = (
 
 
 @contextmanager
-def redrawn(recording: Recording, flight: Flight, robots: Sequence[Robot]) -> Iterator[FramePlan]:
+def redrawn(
+    recording: RecordingFolder, flight: Flight, robots: Sequence[Robot]
+) -> Iterator[FramePlan]:
     """The plan of a recording's images, with its worlds, which last as long as the context.
 
     Images are drawn from the stored motion and true calibration. The first image of each robot is
@@ -58,7 +60,9 @@ def redrawn(recording: Recording, flight: Flight, robots: Sequence[Robot]) -> It
         yield plan
 
 
-def _check_first_images(recording: Recording, plan: FramePlan, robots: Sequence[Robot]) -> None:
+def _check_first_images(
+    recording: RecordingFolder, plan: FramePlan, robots: Sequence[Robot]
+) -> None:
     with FrameMaker(plan) as maker:
         for robot in robots:
             images = recording.images

@@ -1,5 +1,6 @@
 """A small recording made by hand: four images a robot, 24 x 16 pixels."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -23,7 +24,6 @@ from airground.io.header import FrameCounts, Header
 from airground.io.recording_writer import (
     finish,
     ground_image_name,
-    make_folders,
     mav_image_name,
     write_ground,
     write_mav,
@@ -84,12 +84,14 @@ def images(index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return grey, colour, units
 
 
-def write_recording(root: Path) -> Path:
-    make_folders(root)
+def write_recording(root: Path, robots: Sequence[str] = ("mav", "ground")) -> Path:
     nominal = calibration()
-    write_mav(root, nominal.mav, MAV_STAMPS, imu_samples(), magnetic_samples())
-    write_ground(root, nominal.ground, GROUND_STAMPS, imu_samples(), magnetic_samples())
-    digests: dict[str, dict[str, str]] = {folder: {} for folder in layout.IMAGE_FOLDERS}
+    if "mav" in robots:
+        write_mav(root, nominal.mav, MAV_STAMPS, imu_samples(), magnetic_samples())
+    if "ground" in robots:
+        write_ground(root, nominal.ground, GROUND_STAMPS, imu_samples(), magnetic_samples())
+    folders = [folder for folder in layout.IMAGE_FOLDERS if (root / folder).exists()]
+    digests: dict[str, dict[str, str]] = {folder: {} for folder in folders}
     for index, (mav, ground) in enumerate(zip(MAV_STAMPS, GROUND_STAMPS, strict=True)):
         grey, colour, units = images(index)
         for folder, name, image in (
@@ -97,15 +99,16 @@ def write_recording(root: Path) -> Path:
             (layout.GROUND_COLOUR, ground_image_name(int(ground)), colour[..., ::-1]),
             (layout.GROUND_DEPTH, ground_image_name(int(ground)), units),
         ):
-            cv2.imwrite(str(root / folder / name), image)
-            digests[folder][name] = file_digest(root / folder / name)
+            if folder in folders:
+                cv2.imwrite(str(root / folder / name), image)
+                digests[folder][name] = file_digest(root / folder / name)
     header = Header(
         scene="indoor_a",
         seed=7,
         flight=1,
         sensors="nominal",
         duration_s=0.2,
-        frames=FrameCounts(mav=4, ground=4),
+        frames=FrameCounts(**{r: 4 if r in robots else 0 for r in ("mav", "ground")}),
         calibration=nominal,
         digests={},
     )

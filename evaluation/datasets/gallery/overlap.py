@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
-from airground.io.recording import Recording
+from airground.io.robot_recording import Pair
 from sim.recording.truth import Truth
 from sim.robots.motion import Robot
 
@@ -48,7 +48,7 @@ def share_inside(
     return float(inside.all(axis=1).mean())
 
 
-def shared_with_ground(recording: Recording, truth: Truth) -> NDArray[np.float64]:
+def shared_with_ground(recording: Pair, truth: Truth) -> NDArray[np.float64]:
     """(K,) share of the surface in each of some MAV images that the ground robot has seen before
     or after, by the true surfaces and poses."""
     seen = {robot: _seen(recording, truth, robot) for robot in VIEWS}
@@ -66,7 +66,7 @@ def shares(
     return np.array([np.isin(_packed(_cells(view)), near).mean() for view in views_world])
 
 
-def _seen(recording: Recording, truth: Truth, robot: Robot) -> list[NDArray[np.float64]]:
+def _seen(recording: Pair, truth: Truth, robot: Robot) -> list[NDArray[np.float64]]:
     """Points of the true surface in some images of a robot, without images that show nothing."""
     sensed = recording.mav if robot == "mav" else recording.ground
     camera, reach_m = small(sensed.calibration.camera), np.inf

@@ -14,7 +14,8 @@ from PIL import Image
 from airground.core.cloud import Source
 from airground.errors import AirgroundError, RecordingError
 from airground.io.open_recording import layout_of, open_robot
-from airground.io.recording import Recording
+from airground.io.recording_folder import RecordingFolder
+from airground.io.robot_recording import Pair
 from evaluation.datasets.gallery.figures import NAMES, from_above, statistics
 from evaluation.datasets.gallery.overlap import shared_with_ground
 from evaluation.datasets.gallery.statistics import Recorded, Sample, look_at
@@ -162,15 +163,14 @@ def _section(name: str, folder: Path, opener: Opener) -> Section:
             continue
     facts, shared, surface = f"{layout} layout", np.zeros(0), None
     if layout == "airground" and robots:
-        recording = Recording.open(folder)
-        facts = (
-            f"{recording.scene}, seed {recording.seed}, flight {recording.flight}, "
-            f"{recording.sensors} sensors, {recording.duration_s:g} s"
-        )
+        recording = RecordingFolder.open(folder)
+        facts = recording.header.facts()
         if robots[0].path_world is not None:
-            truth = Truth.open(folder)
-            shared = shared_with_ground(recording, truth)
-            drawn = truth.surface("ground").mesh.sample_points_uniformly(SURFACE_POINTS)
+            truth, there = Truth.open(folder), recording.header.frames.robots()
+            if len(there) > 1:
+                pair = Pair(recording.of(Source.MAV), recording.of(Source.GROUND))
+                shared = shared_with_ground(pair, truth)
+            drawn = truth.surface(there[-1]).mesh.sample_points_uniformly(SURFACE_POINTS)
             surface = np.asarray(drawn.points)
     figure = from_above(name, robots, surface)
     return Section(

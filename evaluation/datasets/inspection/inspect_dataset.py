@@ -14,7 +14,7 @@ from airground.errors import InputError, RecordingError
 from airground.io.depth_scale import plausible
 from airground.io.layout import HEADER
 from airground.io.open_recording import layout_of, open_robot, unknown_layout
-from airground.io.recording import Recording
+from airground.io.recording_folder import RecordingFolder
 from airground.io.robot_recording import RobotRecording
 from evaluation.datasets.inspection.exposure import look_at_exposure
 from evaluation.datasets.inspection.findings import Finding, Verdict, look_at_stamps
@@ -114,12 +114,10 @@ def _many(path: Path) -> list[Finding]:
 
 def _ours(path: Path) -> list[Finding]:
     try:
-        recording = Recording.open(path)
+        recording = RecordingFolder.open(path)
     except RecordingError as error:
         return [_unreadable("", error)]
-    made = f"{recording.scene}, seed {recording.seed}, flight {recording.flight}"
-    found = f"{made}, {recording.sensors} sensors, {recording.duration_s:g} s"
-    findings = [Finding("", "recording", found)]
+    findings = [Finding("", "recording", recording.header.facts())]
     try:
         recording.verify()
     except RecordingError as error:
@@ -129,7 +127,7 @@ def _ours(path: Path) -> list[Finding]:
         findings.append(Finding("", "digests", f"all {count} are right"))
     return [
         *findings,
-        *(one for robot in (Source.MAV, Source.GROUND) for one in _robot(path, robot, open_robot)),
+        *(one for robot in recording.robots for one in _robot(path, robot, open_robot)),
     ]
 
 

@@ -245,9 +245,10 @@ def test_the_error_is_measured_in_pixels(
     posed = []
     for index in (2, 2 + APART):
         if robot == "mav":
-            grey = recording.mav.read_image(index).image
+            grey = recording.of(Source.MAV).read_image(index).image
         else:
-            grey = recording.ground.read_image(index).colour.mean(axis=2).astype(np.uint8)
+            colour = recording.of(Source.GROUND).read_image(index).colour
+            grey = colour.mean(axis=2).astype(np.uint8)
         depth = truth.depth(robot, stamps[index])  # type: ignore[arg-type]
         posed.append(Posed(grey, depth, truth.T_world_camera(robot, stamps[index])))  # type: ignore[arg-type]
     x, y = offset

@@ -73,10 +73,10 @@ def test_images_are_the_recordings(bag: Bag, simulated: Simulated) -> None:
     recording = simulated.recording
     for index, (_, message) in enumerate(bag["/mav/camera/image_raw/compressed"]):
         grey = cv2.imdecode(message.data, cv2.IMREAD_UNCHANGED)
-        np.testing.assert_array_equal(grey, recording.mav.read_image(index).image)
+        np.testing.assert_array_equal(grey, recording.of(Source.MAV).read_image(index).image)
     colours = bag["/ground/camera/image_raw/compressed"]
     for index, (_, message) in enumerate(bag["/ground/camera/depth"]):
-        image = recording.ground.read_image(index)
+        image = recording.of(Source.GROUND).read_image(index)
         depth = message.data.view("<f4").reshape(message.height, message.width)
         assert (message.encoding, message.step) == ("32FC1", 4 * message.width)
         np.testing.assert_array_equal(depth, image.depth)

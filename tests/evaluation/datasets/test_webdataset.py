@@ -17,6 +17,7 @@ import webdataset
 import yaml
 from mlcroissant._src.operation_graph.operations import extract
 
+from airground.core.cloud import Source
 from airground.io.digests import file_digest
 from evaluation.datasets import webdataset as shards
 from evaluation.datasets.formats import FORMATS
@@ -102,7 +103,7 @@ def test_croissant_reads_every_file(
     dataset = mlcroissant.Dataset(jsonld=folder / "croissant.json")
     assert not dataset.metadata.ctx.issues.errors
     for index, record in enumerate(dataset.records("mav_grey")):
-        image = simulated.recording.mav.read_image(index).image
+        image = simulated.recording.of(Source.MAV).read_image(index).image
         np.testing.assert_array_equal(np.asarray(record["mav_grey/content"]), image)
     assert index == len(simulated.stamps_ns("mav")) - 1
     records = list(dataset.records("ground_json"))
