@@ -203,6 +203,8 @@ def write_all_but_images(root: Path, flight: Flight) -> tuple[Header, FramePlan,
     nominal = sensors.nominal
     rngs: dict[Robot, np.random.Generator] = {"mav": mav_rng, "ground": ground_rng}
     for robot, left in frames.items():
+        if not len(left.stamps_ns):
+            raise InputError(f"{scene.name}: no image of the {robot} is left by its faults")
         own = of_robot(faults, robot)
         samples = _samples(motion.stamps_ns, motion.robot(robot), preset, own, rngs[robot])
         if robot == "mav":

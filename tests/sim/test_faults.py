@@ -196,6 +196,13 @@ def test_a_recording_differs_by_its_faults_alone(tmp_path: Path) -> None:
     assert not (tmp_path / "good" / "truth" / "faults.csv").exists()
 
 
+def test_faults_must_leave_an_image(tmp_path: Path) -> None:
+    preset = replace(NOMINAL, faults=(Fault("dropped", "mav", 5.0, 0.0),))
+    with pytest.raises(InputError, match="small: no image of the mav is left"):
+        record(SMALL, 3, preset, tmp_path / "out", workers=1)
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_dials_add_a_fault_of_both_robots() -> None:
     assert with_dropped(NOMINAL, 0.0) == NOMINAL
     both = with_imu_gap(with_dropped(NOMINAL, 2.0), 0.5)
