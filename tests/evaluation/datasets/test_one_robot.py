@@ -135,12 +135,14 @@ def test_track_takes_the_robot_that_is_there(recordings: dict[Robot, Path], tmp_
     assert len(open_robot(recordings["mav"], Source.MAV).camera_stamps) == IMAGES
 
 
-def test_truth_of_pixels_is_of_the_robot_that_is_there(
+def test_what_is_rendered_is_of_the_robot_that_is_there(
     recordings: dict[Robot, Path], tmp_path: Path
 ) -> None:
-    words = ["render", str(recordings["mav"]), "--add", "depth", "--every", "10"]
+    words = ["render", str(recordings["mav"]), "--add", "depth,stereo", "--every", "10"]
+    words += ["--scene", str(recordings["mav"].with_name("small.toml")), "--threads", "1"]
     assert cli.answer([*words, "--out", str(tmp_path / "out")]) is None
-    assert [path.name for path in (tmp_path / "out").iterdir()] == ["mav_depth"]
+    made = sorted(path.name for path in (tmp_path / "out").iterdir())
+    assert made == ["mav_depth", "mav_stereo"]
 
 
 @pytest.mark.parametrize(
