@@ -96,7 +96,7 @@ def test_one_robots_bytes_are_those_beside_the_other(
 
 @pytest.mark.slow
 def test_in_a_scene_of_the_package_with_any_number_of_workers(tmp_path: Path) -> None:
-    tiny, slow = load_scene("tiny"), replace(NOMINAL, camera_hz=5.0)
+    tiny, slow = load_scene("tiny"), replace(NOMINAL, every=6)
     both = record(tiny, 1, slow, tmp_path / "both", 8.0, workers=2)
     for robot in ROBOTS:
         alone = [
