@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import IO, Any
 
@@ -141,11 +142,15 @@ def save_figure(figure: Figure, folder: Path, name: str) -> None:
     """Write `name`.png and `name`.pdf; the same figure gives the same bytes."""
     folder.mkdir(parents=True, exist_ok=True)
     save_picture(figure, folder, name)
+    # To memory first: of a full disk Matplotlib's PDF writer makes an error of its own.
+    pdf = BytesIO()
     figure.savefig(
-        folder / f"{name}.pdf",
+        pdf,
+        format="pdf",
         dpi=PICTURE_DPI,
         metadata={"CreationDate": None, "Producer": None, "Creator": None},
     )
+    (folder / f"{name}.pdf").write_bytes(pdf.getvalue())
 
 
 def _lay_out(figure: Figure) -> None:

@@ -173,6 +173,15 @@ def test_the_same_figure_gives_the_same_bytes(tmp_path: Path) -> None:
     assert digests("one") == digests("two")
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is full")
+def test_a_full_disk_is_said_to_be_full(tmp_path: Path) -> None:
+    figure = Figure()
+    figure.add_subplot().plot([1.0, 2.0])
+    (tmp_path / "f.pdf").symlink_to("/dev/full")
+    with pytest.raises(OSError, match="No space left"):
+        save_figure(figure, tmp_path, "f")
+
+
 def test_every_figure_fits_a_paper(showcase: Showcase, tmp_path: Path) -> None:
     table = make_table(conditions=(BEST, PAPER), sequences=3)
     drawn = list(report_figures(table, [BEST, PAPER], showcase))
