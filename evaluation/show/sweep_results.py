@@ -41,7 +41,7 @@ def write_sweep(folder: Path, plan: SweepPlan, measured: Sequence[Measured]) -> 
         at.table.frame.assign(**{name: _column(value) for name, value in at.point.items()})
         for at in measured
     ]
-    pd.concat(rows, ignore_index=True).to_parquet(folder / TABLE, index=False)
+    (folder / TABLE).write_bytes(pd.concat(rows, ignore_index=True).to_parquet(index=False))
     text = json.dumps(_summary(plan, measured), indent=2, allow_nan=False) + "\n"
     (folder / SWEEP).write_text(text, encoding="utf-8")
     write_config(plan.setup.config, folder / CONFIG)

@@ -145,7 +145,8 @@ class ResultTable:
             )
 
     def write(self, path: Path) -> None:
-        self.frame.to_parquet(path, index=False)
+        # As bytes: where the folder is gone, pandas makes an error without a number.
+        path.write_bytes(self.frame.to_parquet(index=False))
 
     def __len__(self) -> int:
         return len(self.frame)

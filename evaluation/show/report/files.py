@@ -36,7 +36,9 @@ def write_behind(folder: Path, name: str, table: ResultTable) -> str:
     frame = table.frame
     rows = frame[(frame["stage"] == stage) & frame["metric"].str.contains(part, regex=False)]
     file = f"figures/{name}.csv"
-    rows.dropna(axis="columns", how="all").to_csv(folder / file, index=False)
+    # As text: where the folder is gone, pandas makes an error without a number.
+    text = rows.dropna(axis="columns", how="all").to_csv(index=False)
+    (folder / file).write_text(text, encoding="utf-8")
     return file
 
 

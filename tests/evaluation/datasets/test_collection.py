@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airground.errors import AirgroundError, InputError
@@ -52,6 +52,7 @@ def test_something_must_be_left_to_train() -> None:
         parse_split(["test=0.5", "val=0.5"])
 
 
+@settings(deadline=None)
 @given(
     count=st.integers(1, 60),
     shares=st.tuples(st.floats(0.01, 0.5), st.floats(0.01, 0.4)),

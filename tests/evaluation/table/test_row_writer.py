@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -49,3 +51,11 @@ def test_the_same_belief_twice_is_found_whatever_its_time() -> None:
     out.add_alignment(Alignment(2, ONE, 0.9, 0.01, True, ""), {"after": ERROR}, 0)
     with pytest.raises(InputError, match="is there twice"):
         ResultTable.from_rows(out.rows).check_once("here")
+
+
+def test_results_say_that_their_folder_is_gone(tmp_path: Path) -> None:
+    out = writer()
+    out.add_belief(BELIEF, ERROR, 1.0, 0, 1)
+    with pytest.raises(FileNotFoundError) as raised:
+        ResultTable.from_rows(out.rows).write(tmp_path / "gone" / "results.parquet")
+    assert raised.value.errno is not None
