@@ -47,7 +47,7 @@ def resumable_folder(path: Path) -> Iterator[OutFolder]:
         OSError: Writing failed; the error names a file.
     """
     new = not path.exists()
-    if not new and not (path / UNITS).is_dir():
+    if not new and not _is_ours(path):
         raise InputError(
             f"--out {path}: exists already and holds no {UNITS}/ to go on with; name a new folder"
         )
@@ -80,6 +80,15 @@ def resumable_folder(path: Path) -> Iterator[OutFolder]:
                 _remove_if_unused(path)
 
 
+def _is_ours(path: Path) -> bool:
+    """Whether a run left this folder: with its units, or with what it made before them, as where
+    the folder vanished meanwhile."""
+    if (path / UNITS).is_dir():
+        return True
+    left = {file.name for file in path.iterdir()} if path.is_dir() else set()
+    return bool(left) and left <= {LOCK, RECORDINGS, SCRATCH, RESULTS}
+
+
 def _take(descriptor: int, path: Path) -> None:
     """Lock the folder; the system releases the lock when this process ends."""
     try:
@@ -95,7 +104,9 @@ def _replace(made: Path, place: Path) -> None:
 
 
 def _remove_if_unused(path: Path) -> None:
-    """Remove a folder without finished units."""
+    """Remove a folder without finished units, if it did not vanish."""
+    if not path.is_dir():
+        return
     left = {file.name for file in path.iterdir()}
     if left <= {LOCK, UNITS} and not any((path / UNITS).glob("*")):
         shutil.rmtree(path)

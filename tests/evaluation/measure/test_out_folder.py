@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,14 @@ def fail_after_a_unit(out: Path) -> None:
         (folder.results / "summary.json").write_text("first")
         (folder.scratch / "left").write_text("behind")
         raise RuntimeError
+
+
+def fail_without_the_folder(out: Path, records: bool) -> None:
+    with resumable_folder(out) as folder:
+        shutil.rmtree(out)
+        if records:
+            (folder.recordings / ".a.partial").mkdir(parents=True)
+        raise OSError("gone")
 
 
 def test_results_appear_when_all_are_complete(tmp_path: Path) -> None:
@@ -56,6 +65,24 @@ def test_other_folders_are_refused_and_unchanged(tmp_path: Path) -> None:
     ):
         pass
     assert [file.name for file in tmp_path.iterdir()] == ["mine"]
+
+
+def test_a_run_goes_on_where_its_folder_vanished_and_was_partly_made_again(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with pytest.raises(OSError, match="gone"):
+        fail_without_the_folder(out, records=True)
+    assert [file.name for file in out.iterdir()] == ["recordings"]
+    with resumable_folder(out) as folder:
+        folder.store.write("key", {}, FOUND)
+    assert {file.name for file in out.iterdir()} == {LOCK, "recordings", "units"}
+    assert list((out / "recordings").iterdir()) == []
+
+
+def test_a_folder_that_vanished_hides_no_error(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with pytest.raises(OSError, match="gone"):
+        fail_without_the_folder(out, records=False)
+    assert not out.exists()
 
 
 def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
