@@ -24,8 +24,9 @@ from tests.kills.commands import RESUMING, SAME, commands, make_inputs
 from tests.kills.victim import Command, digest
 
 TROUBLES = ("full", "read-only", "vanishes")
-ROOM = 3
-"""Times what the output needs: its temporary files lie beside it."""
+ROOM, SPARE_BYTES = 3, 512 << 20
+"""Enough is so many times what the output needs, and so much besides: temporary files lie beside it,
+a flight's painted world among them."""
 
 
 def main() -> int:
@@ -65,7 +66,7 @@ def try_often(verb: str, folder: Path, count: int, seed: int) -> int:
                 code = suffer(victim, trouble, need, float(rng.uniform()), whole_s)
                 refused += code != 0
                 faults += what_is_wrong(victim, code, resumes=verb in RESUMING)
-                remount(disk, f"rw,size={ROOM * need}")
+                remount(disk, f"rw,size={ROOM * need + SPARE_BYTES}")
                 if code != 0:
                     victim.finish()
                 if digest(victim.output(), SAME[verb]) != digest(good.output(), SAME[verb]):
@@ -113,7 +114,7 @@ def what_is_wrong(victim: Command, code: int, resumes: bool) -> list[str]:
 def small_disk(folder: Path, need: int) -> Iterator[Path]:
     """A file system in memory, gone with the block."""
     disk = Path(tempfile.mkdtemp(prefix="disk-", dir=folder))
-    options = f"size={ROOM * need}"
+    options = f"size={ROOM * need + SPARE_BYTES}"
     subprocess.run(["mount", "-t", "tmpfs", "-o", options, "none", disk], check=True)
     try:
         (disk / "tmp").mkdir()
