@@ -25,8 +25,8 @@ from tests.kills.victim import Command, digest
 
 TROUBLES = ("full", "read-only", "vanishes")
 ROOM, SPARE_BYTES = 3, 512 << 20
-"""Enough is so many times what the output needs, and so much besides: temporary files lie beside it,
-a flight's painted world among them."""
+"""Enough is so many times what the output needs, and so much besides: temporary files lie beside
+it, a flight's painted world among them."""
 
 
 def main() -> int:
