@@ -31,7 +31,7 @@ def recordings(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[Robot,
         patch.setattr(recorder, "image_stamps", images_in_flight)
         for robot in ROBOTS:
             words = ["simulate", str(folder / "small.toml"), "--only", robot, "--seed", "3"]
-            assert cli.answer([*words, "--threads", "1", "--out", str(folder / robot)]) is None
+            assert cli.answer([*words, "--out", str(folder / robot)]) is None
         yield {robot: folder / robot for robot in ROBOTS}
 
 
@@ -139,7 +139,7 @@ def test_what_is_rendered_is_of_the_robot_that_is_there(
     recordings: dict[Robot, Path], tmp_path: Path
 ) -> None:
     words = ["render", str(recordings["mav"]), "--add", "depth,stereo", "--every", "10"]
-    words += ["--scene", str(recordings["mav"].with_name("small.toml")), "--threads", "1"]
+    words += ["--scene", str(recordings["mav"].with_name("small.toml"))]
     assert cli.answer([*words, "--out", str(tmp_path / "out")]) is None
     made = sorted(path.name for path in (tmp_path / "out").iterdir())
     assert made == ["mav_depth", "mav_stereo"]

@@ -99,7 +99,7 @@ def test_failures_that_came_and_went_are_distinguished(before: Run) -> None:
     frame.loc[first, "value"] = 2.0
     moved = failures_moved(against(before, made_run("after", ResultTable(frame))))
     assert [failure.key for failure in moved.appeared] == [("sequence", "tiny", 0, 0, 0)]
-    assert moved.appeared[0].story.rows[3][1] == "2.00 m"
+    assert moved.appeared[0].story.rows[3][2] == "2.00 m"
     back = failures_moved(against(made_run("after", ResultTable(frame)), before))
     assert [failure.key for failure in back.went] == [("sequence", "tiny", 0, 0, 0)]
     assert moved.stayed == back.stayed
