@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -18,19 +18,29 @@ LONGEST_GAP_NS = 100_000_000
 """Between poses of the ground robot that are interpolated: three images at 30 Hz."""
 
 
+def newest_image(seen: Seen) -> int:
+    """Stamp of the newest image when an event was seen [ns]: computing takes no recorded time."""
+    return seen.frame.stamp_ns
+
+
 class ClaimLog:
     """An onlooker that notes from when on which relation between the maps was claimed: that of the
     newest accepted alignment. Where the heading is searched, a belief alone claims a place, but no
-    pose: its heading may be off by several degrees."""
+    pose: its heading may be off by several degrees.
 
-    def __init__(self) -> None:
+    Args:
+        when: Recorded time at which an event was seen [ns].
+    """
+
+    def __init__(self, when: Callable[[Seen], int] = newest_image) -> None:
+        self._when = when
         self._claimed: list[tuple[int, SE3]] = []
 
     def see(self, seen: Seen) -> None:
         """Note one event."""
         match seen.event:
             case Aligned(alignment=alignment) if alignment.accepted:
-                self._claimed.append((seen.frame.stamp_ns, alignment.T_ground_mav))
+                self._claimed.append((self._when(seen), alignment.T_ground_mav))
 
     def claims(self, tracked: Mapping[str, Tracked]) -> list[tuple[int, SE3]]:
         """`T_ground_camera_mav_camera` of every image of the MAV with something claimed by then,

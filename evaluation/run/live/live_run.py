@@ -11,7 +11,7 @@ import os
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from airground.core.cloud import Source
 from airground.core.events import Aligned
@@ -19,6 +19,7 @@ from airground.io.recording import Recording
 from airground.io.robot_recording import BOTH
 from airground.link.channel import Receiver
 from airground.tracking import TrackedFrame
+from evaluation.run.claim_log import ClaimLog
 from evaluation.run.driver import drive, pipeline_for
 from evaluation.run.drops import SCHEMA, DropList, Stamps, fingerprint
 from evaluation.run.live.arrivals import Stream, in_order
@@ -100,8 +101,8 @@ def run_live(
     """Play a recording at its own rate through the pipeline, otherwise as `run_recording`.
 
     Returns:
-        The result of a run, with the rows of `add_live_rows`; and the drop list with which a run
-        offline gives the same result.
+        The result of a run, with the rows of `add_live_rows` and the claims as they were made; and
+        the drop list with which a run offline gives the same result, but claims without delay.
 
     Raises:
         AirgroundError: A robot's process refused its task, or could not go on.
@@ -109,10 +110,12 @@ def run_live(
     rows = RunRows(recording, truth, setup)
     pipeline = pipeline_for(recording, setup, localizer_rng(seed, recording.flight))
     with LiveTracking(recording, setup, seed, playback) as tracking:
-        driven = drive(recording, tracking, pipeline, setup, [tracking, rows])
+        claims = ClaimLog(tracking.recorded_now_ns)
+        driven = drive(recording, tracking, pipeline, setup, [tracking, rows, claims])
         log = tracking.log
     add_live_rows(rows.out, recording, log, playback)
     result = rows.result(driven.tracked, pipeline.augmented_map())
+    result = replace(result, claims=claims.claims(driven.tracked))
     return result, log.drops(recording, playback.jpeg_quality)
 
 
@@ -186,6 +189,10 @@ class LiveTracking(AbstractContextManager["LiveTracking"]):
         if isinstance(seen.event, Aligned):
             clock = self.log.clock
             self.log.aligned_ms.append(clock.passed_ms(seen.event.stamp_ns, clock.now_ns()))
+
+    def recorded_now_ns(self, _: Seen) -> int:
+        """Recorded time that it is now [ns]: what is claimed holds for images from now on."""
+        return self.log.clock.now_ns()
 
     def report(self) -> TrackingReport:
         """As `Tracking.report`; a robot whose process died has no answers."""

@@ -58,5 +58,12 @@ def test_nothing_is_claimed_across_a_gap_of_the_ground_robot_or_beyond_its_path(
     assert [stamp // MS for stamp, _ in log.claims(tracks)] == [50, 990]
 
 
+def test_a_live_claim_holds_from_when_it_was_computed() -> None:
+    log = ClaimLog(lambda seen: seen.frame.stamp_ns + 70 * MS)
+    aligned(log, 100, at(0))
+    tracks = both({t: at(0) for t in (110, 160, 170, 200)}, {t: at(0) for t in range(90, 300, 30)})
+    assert [stamp // MS for stamp, _ in log.claims(tracks)] == [170, 200]
+
+
 def test_nothing_is_claimed_without_an_alignment() -> None:
     assert ClaimLog().claims(both({0: at(0)}, {0: at(0)})) == []
