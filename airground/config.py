@@ -178,14 +178,17 @@ class HeightMaps(Section):
 class Localization(Section):
     """Cost map and Monte Carlo localization (Sec. VI)."""
 
-    cost: Literal["zmssd", "ncc"] = "ncc"
-    """Cost of a hypothesis: Eq. 2, or one minus the normalized correlation of the heights."""
-    sigma: Positive = 0.05
-    """Sigma of Eq. 5, in units of the cost (m^2 for zmssd, none for ncc)."""
+    cost: Literal["zmssd", "ncc", "likelihood"] = "likelihood"
+    """Cost of a hypothesis: Eq. 2, one minus the normalized correlation of the heights, or minus
+    the logarithm of how much likelier the heights are if they correlate so than if not at all."""
+    patch_m: Positive = 0.3
+    """With `likelihood`: side of a patch whose heights count as one measurement [m]."""
+    sigma: Positive = 1.0
+    """Sigma of Eq. 5, in units of the cost (m^2 for zmssd, none for ncc and likelihood)."""
     sigma_units: Literal["cost", "minmax"] = "cost"
     """Units of sigma: those of the cost, or the range of the costs that are compared (at first
     those of the whole cost map, then those of the particles)."""
-    min_overlap: Fraction = 0.3
+    min_overlap: Fraction = 0.15
     """Smallest overlap, as a fraction of the aerial map's filled cells."""
     search_radius_m: Positive = 3.0
     """Half the side of the square searched around the ground robot [m]."""
@@ -199,11 +202,12 @@ class Localization(Section):
     """Number of headings over the full circle, if searched."""
     heading_noise_deg: Positive = 1.0
     """Standard deviation of the heading's motion model, if searched [deg]."""
-    joint_maps: Annotated[int, Field(ge=0)] = 4
-    """If the heading is searched, the reported pose is moved to the nearby minimum of the costs of
-    so many newest aerial maps together; 0 leaves it at the particles."""
+    joint_maps: Count = 4
+    """If the heading is searched, so many newest aerial surfaces are laid over the ground map as
+    one."""
     estimate: Literal["mean", "mode"] = "mode"
-    """Reported position: mean of all particles, or of those around the densest place."""
+    """Reported position: mean of all particles, or of those around the densest place; with `mode`
+    and a searched heading, moved to the nearby pose where the heights fit best."""
     redrawn_fraction: Fraction = 0.1
     """Share of the particles that each update draws from the current cost map."""
     min_mode_share: Fraction = 0.6
@@ -220,6 +224,12 @@ class Localization(Section):
     max_self_similarity: Fraction = 0.8
     """Largest correlation of the aerial map with itself, and of the ground map with itself, shifted
     to another place, for a claim."""
+
+    @property
+    def maps_together(self) -> int:
+        """Number of newest aerial surfaces that are laid over the ground map as one: with a known
+        heading one, since the particles alone join them well."""
+        return self.joint_maps if self.heading == "search" else 1
 
 
 class Refinement(Section):
@@ -305,7 +315,7 @@ def _as_published(preset: PresetName, sigma: float) -> Config:
             cost="zmssd",
             sigma=sigma,
             min_overlap=0.5,
-            joint_maps=0,
+            joint_maps=1,
             estimate="mean",
             redrawn_fraction=0.0,
         ),

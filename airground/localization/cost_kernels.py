@@ -12,6 +12,9 @@ from airground.core.arrays import C64, F32, F64, FAST, Floats
 
 COUNT, SUM_A, SUM_G, SUM_AA, SUM_GG, SUM_AG = range(6)
 
+MAX_CORRELATION = 0.999
+"""No two robots' heights correlate more; the same heights have an infinite likelihood."""
+
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FAST)
 def mean_height(heights: F32) -> tuple[float, int]:
@@ -111,6 +114,25 @@ def one_minus_correlation(sums: Floats, min_count: float, min_relief_m: float) -
         variance_g = max(sum_gg / n - (sum_g / n) ** 2, floor)
         covariance = sum_ag / n - sum_a * sum_g / (n * n)
         costs[i] = 1.0 - covariance / np.sqrt(variance_a * variance_g)
+    return costs
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def log_likelihood_ratio(
+    sums: Floats, min_count: float, min_relief_m: float, cells_of_patch: float
+) -> F32:
+    """ln p(independent) - ln p(correlated) of the heights for sums (N, 6) [nat]; NaN where fewer
+    than `min_count` overlap.
+
+    Of n independent pairs from a normal distribution, those with the correlation r are likelier by
+    (1 - r^2)^(-n/2) than those without one. Cells of one patch count as one pair. So a good fit
+    counts the more, the larger the overlap. Negative correlations count as none."""
+    costs = one_minus_correlation(sums, min_count, min_relief_m)
+    for i in range(len(sums)):
+        correlation = min(max(1.0 - costs[i], 0.0), MAX_CORRELATION)
+        pairs = sums[i, COUNT] / cells_of_patch
+        if costs[i] == costs[i]:
+            costs[i] = 0.5 * pairs * np.log(1.0 - correlation * correlation)
     return costs
 
 

@@ -21,6 +21,7 @@ from airground.localization.cost_kernels import (
     SUM_GG,
     about_mean,
     difference_spectrum,
+    log_likelihood_ratio,
     one_minus_correlation,
     squares_spectrum,
     sums_at_positions,
@@ -45,12 +46,17 @@ def masked(heights: F32, margin: int = 0) -> Masked:
     return Masked(*about_mean(heights, margin))
 
 
-def costs_of(sums: Floats, aerial_cells: int, config: Localization) -> F32:
+def costs_of(sums: Floats, aerial_cells: int, cells_per_m: float, config: Localization) -> F32:
     """(N,) costs of the configured kind for sums (N, 6) as in `cost_kernels`."""
     min_count = least_count(aerial_cells, config)
-    if config.cost == "zmssd":
-        return zmssd(sums, min_count)
-    return one_minus_correlation(sums, min_count, config.min_relief_m)
+    match config.cost:
+        case "zmssd":
+            return zmssd(sums, min_count)
+        case "ncc":
+            return one_minus_correlation(sums, min_count, config.min_relief_m)
+        case "likelihood":
+            cells_of_patch = (config.patch_m * cells_per_m) ** 2
+            return log_likelihood_ratio(sums, min_count, config.min_relief_m, cells_of_patch)
 
 
 class OffsetSearch:
@@ -118,7 +124,8 @@ class OffsetSearch:
             differences = self.difference_sums(aerial).reshape(-1, 3)
             costs = zmssd_of_differences(differences, least_count(aerial.filled_cells, config))
         else:
-            costs = costs_of(self.sums(aerial).reshape(-1, 6), aerial.filled_cells, config)
+            sums = self.sums(aerial).reshape(-1, 6)
+            costs = costs_of(sums, aerial.filled_cells, self.cells_per_m, config)
         return costs.reshape(self.shape)
 
     def _aerial_spectra(self, aerial: HeightMap) -> tuple[C64, C64, C64]:
@@ -191,16 +198,18 @@ class Overlays:
         sums: (M, 6) sums as in `cost_kernels`, of heights about the maps' means.
         mean_aerial, mean_ground: Mean heights [m], of the ground where an overlay can reach.
         aerial_cells: Number of filled cells of the aerial map.
+        cells_per_m: Resolution.
     """
 
     sums: F64
     mean_aerial: float
     mean_ground: float
     aerial_cells: int
+    cells_per_m: float
 
     def costs(self, config: Localization) -> F32:
         """(M,) costs, NaN where too little overlaps."""
-        return costs_of(self.sums, self.aerial_cells, config)
+        return costs_of(self.sums, self.aerial_cells, self.cells_per_m, config)
 
     def overlaps(self) -> F64:
         """(M,) overlap as a fraction of the aerial map's filled cells."""
@@ -239,7 +248,7 @@ def overlay_at(aerial: HeightMap, ground: HeightMap, positions: F64) -> Overlays
     a, g = masked(aerial.heights), masked(heights, margin=1)
     shifts = places + (lattice_index(aerial) - first + 1)
     sums = sums_at_positions(a.heights, a.mask, g.heights, g.mask, shifts)
-    return Overlays(sums, a.mean, g.mean, aerial.filled_cells)
+    return Overlays(sums, a.mean, g.mean, aerial.filled_cells, ground.cells_per_m)
 
 
 def overlay_turned(aerial: HeightMap, ground: HeightMap, poses: F64) -> Overlays:
@@ -253,7 +262,7 @@ def overlay_turned(aerial: HeightMap, ground: HeightMap, poses: F64) -> Overlays
     fours, mean_ground = in_fours(heights)
     poses[:, :2] += MARGIN - first
     sums = sums_at_poses(cells, fours, poses)
-    return Overlays(sums, mean_aerial, mean_ground, cells.shape[1])
+    return Overlays(sums, mean_aerial, mean_ground, cells.shape[1], ground.cells_per_m)
 
 
 def _within_reach(ground: HeightMap, places: F64, reach_cells: I64) -> tuple[F32, I64]:

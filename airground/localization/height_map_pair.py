@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,8 +25,8 @@ class HeightMapPair:
 
     Attributes:
         stamp_ns: Stamp of the surface [ns].
-        points_mav: (N, 3) points of the surface in `mav` [m].
-        position_mav: (3,) position of the surface's camera in `mav` [m].
+        points_mav: (N, 3) points of the surface in `mav` [m], or of several.
+        position_mav: (3,) position of the newest surface's camera in `mav` [m].
         points_ground: (M, 3) points of the ground robot's map in `ground` [m].
         ground_robot_position: (2,) centre of the search region in `ground` [m].
         heading: Turn of `mav` in `ground` [rad]; not used where it is searched.
@@ -39,6 +40,18 @@ class HeightMapPair:
     ground_robot_position: F64
     heading: float | None
     config: Config
+    _joined: dict[tuple[int, ...], HeightMapPair] = field(default_factory=dict, repr=False)
+
+    def joined(self, earlier: Sequence[HeightMapPair]) -> HeightMapPair:
+        """The surfaces of earlier pairs and this one as one surface, over this ground map.
+        All surfaces of a flight lie in one frame, which the MAV's SLAM keeps."""
+        if not earlier:
+            return self
+        stamps = tuple(pair.stamp_ns for pair in earlier)
+        if stamps not in self._joined:
+            points = np.concatenate([pair.points_mav for pair in (*earlier, self)])
+            self._joined[stamps] = replace(self, points_mav=points, _joined={})
+        return self._joined[stamps]
 
     @property
     def searched(self) -> bool:

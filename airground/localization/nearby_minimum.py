@@ -1,17 +1,13 @@
-"""The pose near a belief at which the newest aerial maps together fit best.
+"""The pose near a belief at which the heights fit best.
 
-A few degrees of heading change the cost of one map by less than sigma of Eq. 5, so particles spread
-over them. All maps of a flight share one turn of `mav` in `ground`, which the MAV's SLAM keeps: the
-sum of their costs has a sharper minimum. Its place is off by the cells that cannot fit, of boxes
-seen from one side or changed since, as their squares outweigh all others. So the last search
-truncates the differences.
+A few degrees of heading change the cost by less than sigma of Eq. 5, so particles spread over them.
+The place of the lowest cost is off by the cells that cannot fit, of boxes seen from one side or
+changed since, as their squares outweigh all others. So the last search truncates the differences.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable
 from itertools import product
 
 import numpy as np
@@ -37,88 +33,36 @@ TRUNCATION_M = 0.1
 deviations of both maps' heights, and less than most boxes are high. Chosen on two flights."""
 
 
-@dataclass(frozen=True, eq=False)
-class SightedHeights:
-    """Height maps of one aerial surface and of the ground at its time.
-
-    Attributes:
-        aerial: Heights around the surface's camera, for heading 0.
-        ground: Heights in the frame `ground`.
-        position_mav: (3,) position of the surface's camera in `mav` [m].
-    """
-
-    aerial: HeightMap
-    ground: HeightMap
-    position_mav: F64
-
-    @cached_property
-    def cells(self) -> F32:
-        """(3, K) filled cells of the aerial map: x, y [cells], height about the mean [m]."""
-        return filled_cells(self.aerial.heights, *lattice_index(self.aerial))[0]
-
-    def poses_there(self, poses: F64, position_mav: F64) -> F64:
-        """(M, 3) poses of this camera where that at `position_mav` has poses (M, 3)."""
-        back = self.position_mav - position_mav
-        c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-        there = poses.copy()
-        there[:, 0] += c * back[0] - s * back[1]
-        there[:, 1] += s * back[0] + c * back[1]
-        return there
-
-    def costs(self, poses: F64, config: Localization) -> F64:
-        """(M,) costs at poses of this camera, NaN where too little overlaps."""
-        overlay = overlay_turned(self.aerial, self.ground, poses)
-        return overlay.costs(config).astype(np.float64)
-
-    def truncated(self, poses: F64, middle: F64) -> F64:
-        """(M,) mean squared differences of the heights, truncated, in units of the truncation.
-        Their offset is the median at the pose `middle` (3,)."""
-        ground, first = self.ground.heights, lattice_index(self.ground).astype(np.float64)
-        in_cells = np.array([self.ground.cells_per_m, self.ground.cells_per_m, 1.0])
-        offset = np.nanmedian(differences(self.cells, ground, first, middle * in_cells))
-        return truncated_squares(self.cells, ground, first, poses * in_cells, float(offset))
-
-
-def lowest_nearby(sighted: Sequence[SightedHeights], estimate: F64, config: Localization) -> F64:
-    """The pose (3,) around an estimate at which several aerial maps together cost least.
+def lowest_nearby(aerial: HeightMap, ground: HeightMap, estimate: F64, config: Localization) -> F64:
+    """The pose (3,) around an estimate at which an aerial map fits best.
 
     Args:
-        sighted: The aerial maps, the newest last.
-        estimate: x, y [m] of the newest camera and heading [rad].
-        config: Section `localization`; the heading is searched.
+        aerial: Heights around the MAV's camera, for heading 0.
+        ground: Heights in the frame `ground`.
+        estimate: x, y [m] of the camera and heading [rad].
+        config: Section `localization`.
 
     Returns:
-        A minimum within `MODE_RADIUS_M` and `MAX_TURN_DEG`; the estimate where no map overlaps
-        enough. Maps that overlap too little where a search starts do not count in it. The second
-        search counts only where it costs less than sigma of the correlation.
+        A minimum within `MODE_RADIUS_M` and `MAX_TURN_DEG`; the estimate where too little overlaps.
+        The second search counts only where it costs less than sigma.
     """
-    position = sighted[-1].position_mav
-
-    def with_overlap(pose: F64) -> list[SightedHeights]:
-        there = [one.poses_there(pose[None], position) for one in sighted]
-        pairs = zip(sighted, there, strict=True)
-        return [one for one, poses in pairs if np.isfinite(one.costs(poses, config)).all()]
+    cells, first = filled_cells(aerial.heights, *lattice_index(aerial))[0], lattice_index(ground)
+    in_cells = np.array([ground.cells_per_m, ground.cells_per_m, 1.0])
 
     def costs(poses: F64, _: F64) -> F64:
-        found = [one.costs(one.poses_there(poses, position), config) for one in maps]
-        total: F64 = np.sum(found, axis=0)
-        return total
+        return overlay_turned(aerial, ground, poses).costs(config).astype(np.float64)
 
     def truncated(poses: F64, best: F64) -> F64:
-        stacked = np.vstack([best, poses])
-        there = [one.poses_there(stacked, position) for one in maps]
-        pairs = zip(maps, there, strict=True)
-        total: F64 = np.sum([one.truncated(moved[1:], moved[0]) for one, moved in pairs], axis=0)
-        return total
+        where = ground.heights, first.astype(np.float64)
+        offset = np.nanmedian(differences(cells, *where, best * in_cells))
+        return truncated_squares(cells, *where, poses * in_cells, float(offset))
 
-    maps = with_overlap(estimate)
-    if not maps:
+    if not np.isfinite(costs(estimate[None], estimate)).all():
         return estimate
     guess = _descend(estimate, estimate, costs)
-    maps = with_overlap(guess)
     found = _descend(guess, estimate, truncated)
     # Floor on floor has small differences everywhere: the structure must fit as before.
-    before, after = costs(np.array([guess, found]), guess) / len(maps)
+    before, after = costs(np.array([guess, found]), guess)
     return found if after <= before + config.sigma else guess
 
 

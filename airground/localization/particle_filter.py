@@ -19,7 +19,7 @@ from airground.core.se3 import SE3
 from airground.localization.cost_map import Overlays
 from airground.localization.height_map_pair import HeightMapPair
 from airground.localization.hypotheses import CostVolume
-from airground.localization.joint_cost import SightedHeights, lowest_nearby
+from airground.localization.nearby_minimum import lowest_nearby
 from airground.localization.particles import densest_mode, mean_pose, resample, span, weights
 from airground.localization.self_similarity import why_ambiguous
 
@@ -38,7 +38,7 @@ class MonteCarloLocalizer:
         self._rng = rng
         self._particles: F64 | None = None
         self._position_mav = np.zeros(3)
-        self._newest: deque[SightedHeights] = deque(maxlen=self._local.joint_maps)
+        self._newest: deque[HeightMapPair] = deque(maxlen=self._local.maps_together)
         self.belief: Belief | None = None
 
     def update(self, pair: HeightMapPair) -> Iterator[Event]:
@@ -50,10 +50,10 @@ class MonteCarloLocalizer:
         Raises:
             InputError: The heading is needed and unknown, or the resolutions differ.
         """
+        self._newest.append(pair)
+        pair = pair.joined(tuple(self._newest)[:-1])
         position_mav = np.array(pair.position_mav, np.float64)
         yield HeightMapsMade(pair.stamp_ns, pair.aerial, pair.ground)
-        if pair.searched:
-            self._newest.append(SightedHeights(pair.aerial, pair.ground, position_mav))
 
         # Costs of all hypotheses: for the first particles, and for those drawn anew.
         volume = None
@@ -114,8 +114,8 @@ class MonteCarloLocalizer:
         overlay = pair.overlay(estimate[None])
         # Judged where the particles are: no search for a better fit has favoured that place.
         refusal = self._why_refused(pair, particles, estimate, overlay)
-        if self._newest:
-            estimate = lowest_nearby(self._newest, estimate, self._local)
+        if pair.searched and self._local.estimate == "mode":
+            estimate = lowest_nearby(pair.aerial, pair.ground, estimate, self._local)
             overlay = pair.overlay(estimate[None])
         offset = float(overlay.height_offsets()[0])
         return Belief(

@@ -3,8 +3,8 @@
 import numpy as np
 
 
-def cost(aerial, ground, config, aerial_cells):
-    """Eq. 2 or 1 - correlation of two equally large pieces with NaN in holes."""
+def cost(aerial, ground, config, aerial_cells, cells_per_m):
+    """The cost of two equally large pieces with NaN in holes."""
     pairs = [
         (a, g)
         for a, g in zip(aerial.ravel(), ground.ravel(), strict=True)
@@ -16,7 +16,11 @@ def cost(aerial, ground, config, aerial_cells):
     if config.cost == "zmssd":
         return (((a - a.mean()) - (g - g.mean())) ** 2).sum() / (2 * len(a))
     spread = [max(h.std(), config.min_relief_m) for h in (a, g)]
-    return 1.0 - ((a - a.mean()) * (g - g.mean())).mean() / (spread[0] * spread[1])
+    correlation = ((a - a.mean()) * (g - g.mean())).mean() / (spread[0] * spread[1])
+    if config.cost == "ncc":
+        return 1.0 - correlation
+    patches = len(a) / (config.patch_m * cells_per_m) ** 2
+    return patches / 2 * np.log(1 - min(max(correlation, 0.0), 0.999) ** 2)
 
 
 def cell(heights, ix, iy):

@@ -36,7 +36,7 @@ def config(cost, **changes):
     return Localization(cost=cost, search_radius_m=1.0, **changes)
 
 
-@pytest.mark.parametrize("cost", ["zmssd", "ncc"])
+@pytest.mark.parametrize("cost", ["zmssd", "ncc", "likelihood"])
 @pytest.mark.parametrize("seed", range(3))
 def test_all_offsets_equal_a_naive_double_loop(cost, seed):
     rng = np.random.default_rng(seed)
@@ -51,14 +51,16 @@ def test_all_offsets_equal_a_naive_double_loop(cost, seed):
     for ox, oy in np.ndindex(*expected.shape):
         start = np.array([-6, -4]) + first + (ox, oy) - (-12, -13)
         below = naive.piece(ground.heights, start, (14, 11))
-        expected[ox, oy] = naive.cost(aerial.heights, below, setting, aerial.filled_cells)
+        expected[ox, oy] = naive.cost(
+            aerial.heights, below, setting, aerial.filled_cells, CELLS_PER_M
+        )
     assert np.isnan(expected).any()
     assert np.isfinite(expected).any()
     np.testing.assert_allclose(found.costs, expected, rtol=1e-4, atol=2e-6)
 
 
 @pytest.mark.kernel
-@pytest.mark.parametrize("cost", ["zmssd", "ncc"])
+@pytest.mark.parametrize("cost", ["zmssd", "ncc", "likelihood"])
 def test_particles_equal_naive_interpolation(cost):
     rng = np.random.default_rng(5)
     aerial, ground = random_map(rng, (14, 11), (-6, -4)), random_map(rng, (26, 30), (-12, -13))
@@ -71,7 +73,7 @@ def test_particles_equal_naive_interpolation(cost):
         for ix, iy in np.ndindex(14, 11):
             x, y = np.array([ix - 6, iy - 4]) + u * CELLS_PER_M - (-12, -13)
             below[ix, iy] = naive.bilinear(ground.heights, x, y)
-        expected = naive.cost(aerial.heights, below, setting, aerial.filled_cells)
+        expected = naive.cost(aerial.heights, below, setting, aerial.filled_cells, CELLS_PER_M)
         np.testing.assert_allclose(found[p], expected, rtol=1e-3, atol=1e-5)
     np.testing.assert_allclose(turned.costs(setting), found, rtol=2e-3, atol=1e-4)
 
@@ -97,7 +99,7 @@ def test_a_particle_alone_costs_what_it_costs_among_others(turned):
     np.testing.assert_allclose(together.costs(config("ncc")), costs, atol=1e-4)
 
 
-@pytest.mark.parametrize("cost", ["zmssd", "ncc"])
+@pytest.mark.parametrize("cost", ["zmssd", "ncc", "likelihood"])
 def test_a_particle_on_the_lattice_costs_what_the_map_says(cost):
     rng = np.random.default_rng(6)
     aerial, ground = random_map(rng, (20, 16), (-9, -7)), random_map(rng, (40, 40), (-20, -20))
@@ -108,7 +110,7 @@ def test_a_particle_on_the_lattice_costs_what_the_map_says(cost):
     np.testing.assert_allclose(single, whole.costs.ravel(), rtol=1e-3, atol=1e-5)
 
 
-@pytest.mark.parametrize("cost", ["zmssd", "ncc"])
+@pytest.mark.parametrize("cost", ["zmssd", "ncc", "likelihood"])
 @settings(max_examples=15, deadline=None)
 @given(st.integers(-5, 5), st.integers(-5, 5), st.floats(-5, 5))
 def test_a_known_shift_and_height_are_recovered(cost, dx, dy, lift):
@@ -119,6 +121,33 @@ def test_a_known_shift_and_height_are_recovered(cost, dx, dy, lift):
     np.testing.assert_allclose(best, np.array([dx, dy]) / CELLS_PER_M, atol=1e-9)
     offset = overlay_at(aerial, ground, best[None]).height_offsets()[0]
     assert offset == pytest.approx(-lift, abs=1e-4)
+
+
+def test_twice_the_overlap_is_twice_the_evidence():
+    """The same heights twice side by side: cells double, and the correlation stays."""
+    rng = np.random.default_rng(13)
+    aerial, ground = random_map(rng, (20, 16), (0, 0)), random_map(rng, (20, 16), (0, 0))
+    ground.heights.flags.writeable = True
+    ground.heights[:] = aerial.heights + rng.normal(0, 0.1, (20, 16))
+    setting = config("likelihood", min_overlap=0.0)
+
+    def evidence(times):
+        maps = [
+            HeightMap(np.tile(one.heights, (times, 1)), one.origin, CELLS_PER_M)
+            for one in (aerial, ground)
+        ]
+        return overlay_at(*maps, np.zeros((1, 2))).costs(setting)[0]
+
+    assert evidence(1) < -1
+    assert evidence(2) == pytest.approx(2 * evidence(1), rel=1e-3)
+
+
+def test_heights_that_disagree_are_no_evidence():
+    rng = np.random.default_rng(14)
+    aerial = random_map(rng, (20, 16), (0, 0), holes=0.0)
+    upside_down = HeightMap(-aerial.heights, aerial.origin, CELLS_PER_M)
+    found = overlay_at(aerial, upside_down, np.zeros((1, 2)))
+    assert found.costs(config("likelihood")) == 0.0
 
 
 @settings(max_examples=15, deadline=None)

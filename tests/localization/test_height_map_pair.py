@@ -50,3 +50,18 @@ def test_an_unknown_heading_is_named(clouds):
     for heading in (None, np.nan):
         with pytest.raises(InputError, match="stamp 7: the heading"):
             list(localizer.update(paired(clouds, heading)))
+
+
+def test_joined_surfaces_are_one_over_the_newest_ground_map(clouds):
+    aerial, ground = clouds
+    halves = aerial[::2], aerial[1::2]
+    first, second = (
+        HeightMapPair(stamp, half, POSITION, ground, np.zeros(2), 0.0, Config())
+        for stamp, half in enumerate(halves)
+    )
+    joined = second.joined([first])
+    assert joined.points_mav.shape == aerial.shape
+    np.testing.assert_array_equal(joined.aerial.heights, paired(clouds).aerial.heights)
+    assert joined.stamp_ns == second.stamp_ns
+    assert second.joined([first]) is joined
+    assert second.joined([]) is second

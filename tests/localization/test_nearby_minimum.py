@@ -1,4 +1,4 @@
-"""Pose at which several aerial maps fit best: found from a rough guess, whatever has changed."""
+"""Pose at which the heights fit best: found from a rough guess, whatever has changed."""
 
 import numpy as np
 import pytest
@@ -7,9 +7,8 @@ from airground.config import Config
 from airground.core.belief import HeightMap
 from airground.core.height_map import make_height_map
 from airground.localization.height_map_pair import aerial_height_map
-from airground.localization.joint_cost import (
+from airground.localization.nearby_minimum import (
     TRUNCATION_M,
-    SightedHeights,
     differences,
     lowest_nearby,
     truncated_squares,
@@ -23,20 +22,13 @@ GUESS = np.array([0.12, -0.1, np.deg2rad(4.0)])
 
 
 @pytest.fixture(scope="module")
-def sighted():
-    """Three aerial maps of a flight whose `mav` is the world, over one ground map."""
+def maps():
+    """Three aerial surfaces of a flight whose `mav` is the world as one, and their ground map."""
     rng, heap = np.random.default_rng(4), box_heap(1)
     ground = make_height_map(ground_points(heap, rng, frames=30), CONFIG.height_maps.cells_per_m)
-    made = []
-    for place in PATH:
-        camera = np.array([*place, 2.2])
-        points = aerial_points(heap, *place, rng)
-        made.append(
-            SightedHeights(
-                aerial_height_map(points, camera, 0.0, CONFIG.height_maps), ground, camera
-            )
-        )
-    return made
+    points = np.concatenate([aerial_points(heap, *place, rng) for place in PATH])
+    camera = np.array([*PATH[-1], 2.2])
+    return aerial_height_map(points, camera, 0.0, CONFIG.height_maps), ground
 
 
 def errors(pose):
@@ -44,35 +36,35 @@ def errors(pose):
     return np.hypot(*(pose[:2] - PATH[-1])), abs(np.rad2deg(pose[2]))
 
 
-def test_a_guess_moves_to_the_truth(sighted):
+def test_a_guess_moves_to_the_truth(maps):
     start = np.array([*PATH[-1], 0.0]) + GUESS
-    metres, degrees = errors(lowest_nearby(sighted, start, SEARCH))
+    metres, degrees = errors(lowest_nearby(*maps, start, SEARCH))
     assert metres < 0.03
     assert degrees < 1.0
 
 
-def test_changed_boxes_do_not_pull_the_minimum(sighted):
-    heights = sighted[0].ground.heights.copy()
+def test_changed_boxes_do_not_pull_the_minimum(maps):
+    aerial, seen = maps
+    heights = seen.heights.copy()
     centre = (np.array(heights.shape) // 2) + np.array([25, 0])
     heights[centre[0] - 8 : centre[0] + 8, centre[1] + 5 : centre[1] + 30] += 0.5
-    ground = HeightMap(heights, sighted[0].ground.origin, sighted[0].ground.cells_per_m)
-    changed = [SightedHeights(one.aerial, ground, one.position_mav) for one in sighted]
+    ground = HeightMap(heights, seen.origin, seen.cells_per_m)
     start = np.array([*PATH[-1], 0.0]) + GUESS
-    metres, degrees = errors(lowest_nearby(changed, start, SEARCH))
+    metres, degrees = errors(lowest_nearby(aerial, ground, start, SEARCH))
     assert metres < 0.03
     assert degrees < 1.0
 
 
-def test_the_result_stays_near_the_guess(sighted):
+def test_the_result_stays_near_the_guess(maps):
     start = np.array([*PATH[-1], 0.0]) + np.array([0.5, 0.3, 0.4])
-    off = lowest_nearby(sighted, start, SEARCH) - start
+    off = lowest_nearby(*maps, start, SEARCH) - start
     assert np.hypot(*off[:2]) <= 0.25 + 1e-9
     assert abs(off[2]) <= np.deg2rad(10.0) + 1e-9
 
 
-def test_without_overlap_the_guess_stays(sighted):
+def test_without_overlap_the_guess_stays(maps):
     start = np.array([40.0, 0.0, 1.0])
-    np.testing.assert_array_equal(lowest_nearby(sighted, start, SEARCH), start)
+    np.testing.assert_array_equal(lowest_nearby(*maps, start, SEARCH), start)
 
 
 @pytest.mark.kernel

@@ -38,7 +38,10 @@ def no_overlap(flown: Sequence[Flown], rng: np.random.Generator, maps: int) -> l
     angle = rng.uniform(-np.pi, np.pi)
     away = np.array([np.cos(angle), np.sin(angle)])
     views = _surfaces(_heap(flown, rng), rng, maps)
-    return [view.cut(worlds.LEFT, lambda points: points[:, :2] @ away) for view in views]
+    return [
+        view.cut(worlds.LEFT, lambda points: points[:, :2] @ away, views[:k])
+        for k, view in enumerate(views)
+    ]
 
 
 def flat(flown: Sequence[Flown], rng: np.random.Generator, maps: int) -> list[View]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -51,16 +51,21 @@ class View:
         ground = (self.ground * flip).astype(np.float32)
         return replace(self, ground=ground, robot=self.robot * flip[:2], T_ground_mav=None)
 
-    def cut(self, left: float, where: Callable[[Points], NDArray]) -> View:
-        """Over the part of its map beyond a line that leaves a share of the surface over it.
+    def cut(
+        self, left: float, where: Callable[[Points], NDArray], earlier: Sequence[View] = ()
+    ) -> View:
+        """Over the part of its map beyond a line that leaves a share of the surface over it, and of
+        that joined with those before it.
 
         Args:
             left: Share of the surface's points that stay over the map.
             where: Distance of points in `ground` along the direction away from the surface [m].
+            earlier: The views before it in the flight.
         """
         assert self.T_ground_mav is not None
-        aerial = (self.T_ground_mav @ self.aerial).astype(np.float32)
-        edge = np.quantile(where(aerial), 1 - left)
+        surfaces = [self.T_ground_mav @ view.aerial for view in (*earlier, self)]
+        joined = [np.concatenate(surfaces[k:]).astype(np.float32) for k in range(len(surfaces))]
+        edge = max(np.quantile(where(aerial), 1 - left) for aerial in joined)
         kept = self.ground[where(self.ground) > edge]
         return replace(self, ground=kept, T_ground_mav=None)
 

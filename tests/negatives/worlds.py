@@ -61,7 +61,10 @@ def rows_moved(rng: np.random.Generator, maps: int) -> list[View]:
     heap = _rows(rng)
     views = fly(heap, heap, rng, maps)
     sign = 1.0 if views[0].camera[0] > views[0].robot[0] else -1.0
-    return [view.cut(LEFT, lambda points: -sign * points[:, 0]) for view in views]
+    return [
+        view.cut(LEFT, lambda points: -sign * points[:, 0], views[:k])
+        for k, view in enumerate(views)
+    ]
 
 
 def fly(flown: Heap, driven: Heap, rng: np.random.Generator, maps: int) -> list[View]:

@@ -29,7 +29,7 @@ from evaluation.table.truth_errors import PoseError, pose_error, true_T_ground_m
 from sim.recording.truth import Truth
 
 OVERLAP_LEFT = 0.10
-"""Share of the aerial points above the ground map in `NO_OVERLAP`: a third of the least overlap
+"""Share of the aerial points above the ground map in `NO_OVERLAP`: less than the least overlap
 that localization requires."""
 
 
@@ -48,24 +48,32 @@ def add_negatives(
     robot's map of another scene; None leaves `WRONG_MAP` out. `seed` has the seed of the recording
     and the number of the flight.
     """
-    sightings = [without_overlap(sighting, truth) for sighting in maps.sightings]
+    together = config.localization.maps_together
+    sightings = [
+        without_overlap(maps.sightings[max(0, newest - together + 1) : newest + 1], truth)
+        for newest in range(len(maps.sightings))
+    ]
     _add_case(out, NO_OVERLAP, sightings, truth, config, seed, protocol)
     if stranger is not None:
         sightings = [over_another_map(sighting, stranger) for sighting in maps.sightings]
         _add_case(out, WRONG_MAP, sightings, truth, config, seed, protocol)
 
 
-def without_overlap(sighting: Sighting, truth: Truth) -> Sighting:
-    """A sighting whose ground map lies under only `OVERLAP_LEFT` of the aerial surface.
+def without_overlap(together: Sequence[Sighting], truth: Truth) -> Sighting:
+    """The newest sighting, its ground map under only `OVERLAP_LEFT` of its aerial surface, and of
+    that with those before it which are localized together with it.
     The ground map is cut along a line across the aerial surface, and the side of the ground map's
     centre is kept, as if the robot had not driven that far yet."""
-    aerial = _horizontal(true_T_ground_mav(sighting, truth) @ sighting.surface.cloud_mav.points)
+    sighting = together[-1]
+    T_ground_mav = true_T_ground_mav(sighting, truth)
+    surfaces = [_horizontal(T_ground_mav @ one.surface.cloud_mav.points) for one in together]
     cloud = sighting.ground_cloud
     ground = _horizontal(cloud.points)
-    if len(aerial) == 0 or len(ground) == 0:
+    if len(surfaces[-1]) == 0 or len(ground) == 0:
         return sighting
-    away = ground.mean(axis=0) - aerial.mean(axis=0)
-    edge = np.quantile(aerial @ away, 1 - OVERLAP_LEFT)
+    away = ground.mean(axis=0) - surfaces[-1].mean(axis=0)
+    joined = [np.concatenate(surfaces[first:]) for first in range(len(surfaces))]
+    edge = max(np.quantile(aerial @ away, 1 - OVERLAP_LEFT) for aerial in joined)
     kept = ground @ away > edge
     return replace(sighting, ground_cloud=PointCloud(cloud.points[kept], cloud.colours[kept]))
 

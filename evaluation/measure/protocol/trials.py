@@ -125,8 +125,8 @@ def localize_sequences(
 ) -> Iterator[tuple[int, Event, float | None, Iteration | None]]:
     """Run overlapping sequences together, each with the results of `localize_sequence`.
 
-    Results that depend on the aerial map alone are computed once for all sequences: with a
-    searched heading, these take nearly all of the time.
+    Results that depend on the maps alone are computed once for all sequences with the same aerial
+    surfaces: with a searched heading, these take nearly all of the time.
 
     Args:
         sightings: Sightings of a flight.
@@ -143,15 +143,16 @@ def localize_sequences(
         sequence: MonteCarloLocalizer(config, rng) for sequence, (_, rng) in filters.items()
     }
     for index, sighting in enumerate(sightings):
-        pair, computed = pair_of(sighting, config), set[type[Event]]()
+        pair, computed = pair_of(sighting, config), set[tuple[type[Event], int]]()
         for sequence, (start, _) in filters.items():
             if start <= index < start + length:
+                surfaces = min(index - start + 1, config.localization.maps_together)
                 steps = _update(localizers[sequence], pair, sighting, truth)
                 for event, duration_ms, iteration in steps:
-                    again = type(event) in computed
+                    again = (type(event), surfaces) in computed
                     yield sequence, event, None if again else duration_ms, iteration
                     if isinstance(event, (HeightMapsMade, CostMapComputed)):
-                        computed.add(type(event))
+                        computed.add((type(event), surfaces))
 
 
 def _update(

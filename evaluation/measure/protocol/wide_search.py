@@ -27,8 +27,8 @@ WIDER = 2.0
 """Search radius as a multiple of the pipeline's: enough to reach beyond the ground map."""
 HERE_M, ELSEWHERE_M = 0.25, 0.5
 """Radius within which a place counts as the true one, and beyond which as another [m]."""
-WORST = 2.0
-"""Cost of heights with correlation -1; as ZMSSD [m^2], of heights that differ by 2 m RMS."""
+WORST = {"zmssd": 2.0, "ncc": 2.0, "likelihood": 0.0}
+"""Cost of heights that differ by 2 m RMS [m^2], with correlation -1, and without correlation."""
 
 
 def add_wide_searches(
@@ -62,7 +62,8 @@ def lead_of(cost_map: CostMap, place: NDArray) -> float:
     Positive if the true place has the lowest cost. A place without a cost counts as `WORST`."""
     cells = np.indices(cost_map.costs.shape) / cost_map.cells_per_m
     away = np.hypot(*(cells + (cost_map.origin - place)[:, None, None]))
-    costs = np.nan_to_num(cost_map.costs, nan=WORST)
-    here = costs[away <= HERE_M].min(initial=WORST)
-    elsewhere = costs[away > ELSEWHERE_M].min(initial=WORST)
+    worst = WORST[cost_map.cost]
+    costs = np.nan_to_num(cost_map.costs, nan=worst)
+    here = costs[away <= HERE_M].min(initial=worst)
+    elsewhere = costs[away > ELSEWHERE_M].min(initial=worst)
     return float(elsewhere - here)

@@ -25,7 +25,7 @@ from evaluation.show.figures.style import (
     value_range,
 )
 
-COST_UNITS = {"zmssd": "ZMSSD [m²]", "ncc": "1 - correlation"}
+COST_UNITS = {"zmssd": "ZMSSD [m²]", "ncc": "1 - correlation", "likelihood": "ln likelihood ratio"}
 
 
 @styled

@@ -86,7 +86,7 @@ def test_a_tenth_of_the_overlap_and_most_of_the_map_are_left(
 ) -> None:
     for sighting in sightings:
         assert overlap(sighting, truth) > 0.5
-        lost = without_overlap(sighting, truth)
+        lost = without_overlap([sighting], truth)
         # Cells at the edge are cut through.
         assert 0.02 < overlap(lost, truth) < OVERLAP_LEFT + 0.03
         assert len(lost.ground_cloud) > 1000
@@ -106,7 +106,7 @@ def test_maps_without_points_are_unchanged(
         surface if which == "surface" else one.surface, ground, 0, one.T_mav_camera, 0,
         T_GROUND_CAMERA, HEADING,
     )  # fmt: skip
-    assert without_overlap(bare, truth) is bare
+    assert without_overlap([bare], truth) is bare
 
 
 def test_no_position_is_claimed_in_a_negative_case(

@@ -46,8 +46,10 @@ def test_neighbours_of_the_true_place_are_not_compared() -> None:
 
 
 def test_places_without_a_cost_have_the_worst_cost() -> None:
-    assert lead_of(cost_map({(2, 3): 0.4}, fill=np.nan), PLACE) == pytest.approx(0.4 - WORST)
-    assert lead_of(cost_map({(10, 20): 0.4}, fill=np.nan), PLACE) == pytest.approx(WORST - 0.4)
+    assert lead_of(cost_map({(2, 3): 0.4}, fill=np.nan), PLACE) == pytest.approx(0.4 - WORST["ncc"])
+    assert lead_of(cost_map({(10, 20): 0.4}, fill=np.nan), PLACE) == pytest.approx(
+        WORST["ncc"] - 0.4
+    )
 
 
 def test_each_aerial_map_is_located_in_a_wider_region(flown: Flown) -> None:
