@@ -51,14 +51,14 @@ def test_values_are_toml_and_words_need_no_quotes() -> None:
 @pytest.mark.parametrize(
     ("override", "named"),
     [
-        ("localization.sgima=1", "unknown key localization.sgima; known: cost, sigma"),
+        ("localization.sgima=1", "unknown key localization.sgima; known: cost, patch_m, sigma"),
         ("localisation.sigma=1", "unknown section 'localisation'; known: monocular_slam"),
         ("preset=paper", "expected SECTION.NAME=VALUE"),
         ("localization.sigma", "expected SECTION.NAME=VALUE"),
         ("localization.min_overlap=2", "localization.min_overlap = 2"),
         ("fusion.truncation_m=-1", "greater than 0"),
         ("fusion.voxels=[1, 2]", "fusion.voxels"),
-        ("localization.cost=ssd", "'zmssd' or 'ncc'"),
+        ("localization.cost=ssd", "'zmssd', 'ncc' or 'likelihood'"),
         ("preset.name=1", "unknown section 'preset'"),
     ],
 )
