@@ -205,8 +205,8 @@ WATCHED = (
     # How clearly the true place wins where most places hold little of the map.
     Metric(
         "wide_lead", "true place's lead, wide", "cost", "higher", "surface",
-        samples.values(wide_search.STAGE, "lead"), -max(wide_search.WORST.values()), _TWENTIETH, 0.05,
-        relative=True,
+        samples.values(wide_search.STAGE, "lead"), -max(wide_search.WORST.values()), _TWENTIETH,
+        0.05, relative=True,
     ),
     _success(
         "wide_within_50cm", f"within {NEAR_M:g} m, wide search", "surface",
