@@ -218,6 +218,10 @@ class Localization(Section):
     """Least standard deviation of the heights over the overlap for a claim [m]."""
     min_correlation: Fraction = 0.4
     """Least correlation of the heights at the estimate for a claim."""
+    min_evidence: Annotated[float, Field(ge=0)] = 16.0
+    """With `likelihood`: least logarithm of the likelihood ratio at the estimate for a claim [nat].
+    Some 10 000 places and headings differ by a patch or more, so one of them reaches ln 10 000 = 9
+    by chance; 7 more make that a matter of one in a thousand."""
     min_agreement: Fraction = 0.2
     """Least agreement of the heights beyond chance for a claim (Cohen's kappa,
     core/agreement.py)."""

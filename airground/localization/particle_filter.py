@@ -173,6 +173,12 @@ def why_refused(overlay: Overlays, agreed: Agreement, particles: F64, config: Lo
     correlation = float(overlay.correlations()[0])
     if correlation < config.min_correlation:
         return f"heights disagree: at the estimate they correlate by {correlation:.2f} only"
+    evidence = -float(overlay.costs(config)[0])
+    if config.cost == "likelihood" and evidence < config.min_evidence:
+        return (
+            f"heights disagree: that they correlate by {correlation:.2f} over {overlap:.0%} of the "
+            f"aerial map may be chance ({evidence:.0f} nat, {config.min_evidence:g} are enough)"
+        )
     if agreed.kappa < config.min_agreement:
         return (
             f"heights disagree: they agree over {agreed.share:.0%} at the estimate, "
