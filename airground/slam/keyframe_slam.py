@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -97,12 +96,12 @@ class KeyframeSlam:
         self.path.clear()
         own = self.camera, self.T_rig_camera, self.parameters
         self.adjuster = MapAdjuster(self.map, *own, self._inverse_depth_sigma)
-        self._whole = WholeMap(self.map, self.adjuster)
         self._mapper = LocalMapper(self.map, self.tracker, self.adjuster, *own, self._max_depth_m)
         self._recovery = Recovery(self.map, *own)
         self._loops = LoopCloser(
             self.map, self.tracker, self.adjuster, self._recovery, *own, self._max_depth_m
         )
+        self._whole = WholeMap(self.map, self.adjuster, self._loops)
         self._choice = KeyframeChoice(self.map, *own)
         self._culler = KeyframeCuller(self.map, self.adjuster, self._recovery, self.path, *own)
 
@@ -330,15 +329,13 @@ class KeyframeSlam:
             adjusted = replace(adjusted, velocity=self.state.velocity)
         self.state = adjusted
         self._recovery.add_keyframe()
-        close = partial(self._loops.close, frame.depth)
-        closed = not self._mapper.found_old and self._follow(close)
-        if closed:
-            self._whole.loop_closed()
+        if not self._mapper.found_old:
+            self._loops.consider(frame.depth, self.inertial)
         # Until scale and vertical are known, they are sought by all keyframes.
         if self.settled:
             self._culler.cull(self.inertial)
         self.motion.forget_before(self.map.keyframes[-1].stamp_ns)
-        return (self.adjuster.all_due() and self.adjust_all(at_once=False)) or closed
+        return self.adjuster.all_due() and self.adjust_all(at_once=False)
 
     def _follow(self, adjust: Callable[[bool], bool]) -> bool:
         """Go on from the newest keyframe if the whole map is adjusted; returns whether it was."""

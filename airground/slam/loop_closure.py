@@ -14,16 +14,16 @@ from airground.config import KeyframeSlam
 from airground.core.arrays import F32, F64, I8, I64
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
+from airground.slam.bundle_adjustment import Pieces
 from airground.slam.feature_tracker import FeatureTracker
-from airground.slam.local_mapping import CROWDED
 from airground.slam.map_adjustment import FIRST_STEPS, GLOBAL, MOST_AT_ONCE, MapAdjuster
 from airground.slam.pose_graph import MIN_SHARED, Edge, straighten
 from airground.slam.recovery import Found, Recovery
 from airground.slam.rig_state import RigState
-from airground.slam.sparse_map import SparseMap
+from airground.slam.sparse_map import Keyframe, SparseMap
 
 EVERY = 3
-"""Comparing a keyframe with all old ones takes as long as tracking an image: only every third
+"""Comparing a keyframe with all old ones takes as long as tracking some images: only every third
 is compared."""
 MIN_AGREEING = 25
 """Old points, each good to a pixel, that must agree on one pose."""
@@ -43,7 +43,12 @@ MAX_LOST = 0.03
 
 @dataclass(eq=False)
 class LoopCloser:
-    """Recognizes old places and straightens the map by them."""
+    """Recognizes old places and straightens the map by them.
+
+    Work is spread over the images after a keyframe, a piece at each: likenesses are counted, the
+    place is recognized, the map is corrected. Keyframes may be made or culled meanwhile, so that
+    pieces hand on keyframes and poses, but neither indices nor numbers of points.
+    """
 
     map: SparseMap
     tracker: FeatureTracker
@@ -54,74 +59,118 @@ class LoopCloser:
     parameters: KeyframeSlam
     max_depth_m: float = np.inf
     _passed_over: int = field(default=0, init=False)
+    _work: Pieces[bool] | None = field(default=None, init=False)
 
-    def close(self, depth: F32 | None, inertial: bool) -> bool:
-        """Correct the whole map if the newest keyframe shows an old place; returns whether it did.
+    @property
+    def under_way(self) -> bool:
+        """Whether a keyframe is still being compared."""
+        return self._work is not None
+
+    def consider(self, depth: F32 | None, inertial: bool) -> None:
+        """Compare the newest keyframe with old ones from the next image on, if it is its turn.
         `depth` is the keyframe's (height, width) depth [m]; None without a depth camera."""
-        first_recent = len(self.map.keyframes) - 1 - self.parameters.window
         # Without depth or accelerometer the scale drifts, too, which this cannot mend.
-        if first_recent <= 0 or (depth is None and not inertial):
-            return False
+        if len(self.map.keyframes) - 1 <= self.parameters.window or not (
+            depth is not None or inertial
+        ):
+            return
         self._passed_over = (self._passed_over + 1) % EVERY
-        if self._passed_over or self.parameters.reused_keyframes == 0:
+        if self._passed_over == 0 and self.parameters.reused_keyframes > 0:
+            self._work = self._closing(self.map.keyframes[-1], depth, inertial)
+
+    def go_on(self) -> bool:
+        """Do a piece of the work under way; returns whether it corrected the whole map."""
+        assert self._work is not None
+        try:
+            next(self._work)
+        except StopIteration as finished:
+            self._work = None
+            return bool(finished.value)
+        return False
+
+    def drop(self) -> None:
+        """The map was scaled or turned: what was found in it is of no use."""
+        self._work = None
+
+    def _closing(self, keyframe: Keyframe, depth: F32 | None, inertial: bool) -> Pieces[bool]:
+        """In pieces, correct the map if a keyframe shows an old place; returns whether it did."""
+        alike = self.recovery.resembling(keyframe, self._old(keyframe))
+        if not alike:
             return False
-        recent = self.map.seen_by(list(range(first_recent, len(self.map.keyframes))))
-        # Keyframes that share points with recent ones are reached by projection.
-        shared = self.map.shared(recent)[:first_recent]
-        old = [int(k) for k in np.flatnonzero(shared < MIN_SHARED)]
-        if not old:
+        yield
+        T_map_camera = self.recovery.recognize(keyframe, alike)
+        if T_map_camera is None:
             return False
-        found = self.recovery.again(old, recent)
-        if found is None or not self._believable(found, old, inertial):
+        yield
+        old = self._old(keyframe)
+        found = self.recovery.again(keyframe, T_map_camera, old, self._recent(keyframe))
+        if found is None or not self._believable(keyframe, found, old, inertial):
             return False
-        return self._correct(found, self._best(found, old), depth, inertial)
+        return self._correct(keyframe, found, self._best(found, old), depth, inertial)
+
+    def _first_recent(self, keyframe: Keyframe) -> int:
+        return self.map.keyframes.index(keyframe) - self.parameters.window
+
+    def _recent(self, keyframe: Keyframe) -> I64:
+        """Numbers of the points that a keyframe, those of the window before it, or later ones
+        saw."""
+        recent = range(self._first_recent(keyframe), len(self.map.keyframes))
+        return self.map.seen_by(list(recent))
+
+    def _old(self, keyframe: Keyframe) -> list[int]:
+        """Keyframes before the window that share no points with recent ones: those that do are
+        reached by projection."""
+        shared = self.map.shared(self._recent(keyframe))[: self._first_recent(keyframe)]
+        return [int(k) for k in np.flatnonzero(shared < MIN_SHARED)]
 
     def _best(self, found: Found, old: list[int]) -> int:
         """The old keyframe that saw most of the points."""
         shared = self.map.shared(found.ids)
         return max(old, key=lambda k: int(shared[k]))
 
-    def _believable(self, found: Found, old: list[int], inertial: bool) -> bool:
+    def _believable(self, keyframe: Keyframe, found: Found, old: list[int], inertial: bool) -> bool:
         """Whether enough points agree and a robot can have drifted so far."""
         if len(found.ids) < MIN_AGREEING:
             return False
-        T_map_camera = self.map.keyframes[-1].state.pose() @ self.T_rig_camera
+        T_map_camera = keyframe.state.pose() @ self.T_rig_camera
         correction = found.fit.T_map_camera @ T_map_camera.inverse()
         expected = self.camera.project(T_map_camera.inverse() @ self.map.positions[found.ids])
-        straight = self.map.keyframes[-1].shutter.straight(found.pixels)
+        straight = keyframe.shutter.straight(found.pixels)
         off_px = np.nan_to_num(np.linalg.norm(expected - straight, axis=1), nan=np.inf)
         if np.median(off_px) < MIN_DRIFT_PX:
             return False
         tilt = np.arccos(min(1.0, correction.rotation[2, 2]))
         if inertial and tilt > MAX_TILT:
             return False
-        steps = [keyframe.state.position for keyframe in self.map.keyframes]
-        way = np.linalg.norm(np.diff(steps[self._best(found, old) :], axis=0), axis=1).sum()
+        between = slice(self._best(found, old), self.map.keyframes.index(keyframe) + 1)
+        steps = [passed.state.position for passed in self.map.keyframes[between]]
+        way = np.linalg.norm(np.diff(steps, axis=0), axis=1).sum()
         shift = found.fit.T_map_camera.translation - T_map_camera.translation
         drifted = np.linalg.norm(shift) < DRIFT_M + DRIFT_SHARE * way
         return bool(drifted and correction.angle() < MAX_TURN)
 
-    def _correct(self, found: Found, old: int, depth: F32 | None, inertial: bool) -> bool:
+    def _correct(
+        self, keyframe: Keyframe, found: Found, old: int, depth: F32 | None, inertial: bool
+    ) -> bool:
         """Pose graph, then bundle adjustment of everything; undone if the loop does not fit. Of a
-        large map only the first steps are taken: `WholeMap.loop_closed` goes on."""
-        newest = self.map.keyframes[-1]
+        large map only the first steps are taken: `WholeMap.loop_closed` goes on. The next keyframe
+        finds the old points by projection."""
         before = MapSnapshot.of(self.map)
         T_map_rig = found.fit.T_map_camera @ self.T_rig_camera.inverse()
-        T_old_newest = self.map.keyframes[old].state.pose().inverse() @ T_map_rig
-        last = len(self.map.keyframes) - 1
-        straighten(self.map, Edge(old, last, T_old_newest, float(len(found.ids))))
-        depths = newest.shutter.inverse_depths_at(depth, found.pixels, self.max_depth_m)
-        newest.see(found.ids, newest.shutter.straight(found.pixels), depths)
+        T_old_keyframe = self.map.keyframes[old].state.pose().inverse() @ T_map_rig
+        index = self.map.keyframes.index(keyframe)
+        straighten(self.map, Edge(old, index, T_old_keyframe, float(len(found.ids))))
+        depths = keyframe.shutter.inverse_depths_at(depth, found.pixels, self.max_depth_m)
+        keyframe.see(found.ids, keyframe.shutter.straight(found.pixels), depths)
         large = len(self.map.keyframes) > MOST_AT_ONCE
         self.adjuster.adjust_all(inertial, FIRST_STEPS if large else GLOBAL)
-        fitting = np.isin(found.ids, newest.ids) & self.map.mapped(found.ids)
-        left = sum(len(keyframe.ids) for keyframe in self.map.keyframes) - fitting.sum()
+        fitting = np.isin(found.ids, keyframe.ids) & self.map.mapped(found.ids)
+        left = sum(len(one.ids) for one in self.map.keyframes) - fitting.sum()
         if fitting.mean() < MIN_FITTING or left < (1.0 - MAX_LOST) * before.sighting_count():
             before.restore(self.map)
             return False
-        self.tracker.keep(np.isin(self.tracker.ids, newest.ids))
-        self.tracker.add(found.ids[fitting], found.pixels[fitting])
-        self.tracker.thin(CROWDED * self.parameters.corner_spacing_px)
+        misfits = np.setdiff1d(before.sightings[-1][0], self.map.keyframes[-1].ids)
+        self.tracker.keep(~np.isin(self.tracker.ids, misfits))
         return True
 
 

@@ -16,7 +16,7 @@ from airground.slam.geometry.pose_estimation import PoseFit, estimate_pose
 from airground.slam.geometry.relocalization import KeyframeIndex
 from airground.slam.reacquisition import find_in_keyframes, keyframes_in_view, visible
 from airground.slam.rolling_shutter import GLOBAL, Shutter
-from airground.slam.sparse_map import SparseMap
+from airground.slam.sparse_map import Keyframe, SparseMap
 
 MIN_FOUND = 20
 """Least number of agreeing map points for a relocalization."""
@@ -111,18 +111,26 @@ class Recovery:
         # Descriptors find the place, patches the pixel.
         return None if found is None else self.near(image, found.fit.T_map_camera, shutter=shutter)
 
-    def again(self, among: list[int], without: I64) -> Found | None:
-        """Look for the places of old keyframes in the newest one; some points do not count."""
-        newest = self.map.keyframes[-1]
+    def resembling(self, keyframe: Keyframe, among: list[int]) -> list[int]:
+        """Stamps of those keyframes of some that may show the place of another [ns]."""
         stamps = [self.map.keyframes[k].stamp_ns for k in among]
-        alike = self._index.resembling(newest.stamp_ns, stamps)
-        if not alike:
-            return None
-        found = self._index.find(newest.image, self.camera, self._places, alike)
-        if found is None:
-            return None
-        place = found.fit.T_map_camera
-        return self.near(newest.image, place, among=among, without=without, shutter=newest.shutter)
+        return self._index.resembling(keyframe.stamp_ns, stamps)
+
+    def recognize(self, keyframe: Keyframe, stamps_ns: list[int]) -> SE3 | None:
+        """Where a keyframe's camera is by those of some stamps, as far as they are still there."""
+        there = [stamp_ns for stamp_ns in stamps_ns if stamp_ns in self._index]
+        found = self._index.find(keyframe.image, self.camera, self._places, there)
+        return None if found is None else found.fit.T_map_camera
+
+    def again(
+        self, keyframe: Keyframe, T_map_camera: SE3, among: list[int], without: I64
+    ) -> Found | None:
+        """Look for the points of old keyframes in another whose camera is about there; some points
+        do not count."""
+        shutter = keyframe.shutter
+        return self.near(
+            keyframe.image, T_map_camera, among=among, without=without, shutter=shutter
+        )
 
     def _places(self, ids: I64) -> F64:
         """(n, 3) positions of points, NaN where they have none."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from airground.core.arrays import F64
 from airground.slam.bundle_adjustment import Adjustment, Pieces, States, adjusting
+from airground.slam.loop_closure import LoopCloser
 from airground.slam.map_adjustment import GLOBAL, MOST_AT_ONCE, MapAdjuster
 from airground.slam.rig_state import RigState
 from airground.slam.sparse_map import SparseMap
@@ -23,13 +24,15 @@ class WholeMap:
 
     Spread, a first image takes the map as it is, every further one does a piece of the work (some
     four of them make a step of the optimization), and the last one moves the map. Pieces are
-    counted, not timed, so that the result depends on the images only. Loop closure and `at_once`
-    adjust the same map: work under way is then dropped. Where the map is scaled or turned, it
-    begins anew; with another map (`KeyframeSlam.reset`) it is gone.
+    counted, not timed, so that the result depends on the images only. Looking for a closed loop
+    goes first, a piece an image, too. A closed loop and `at_once` adjust the same map: work under
+    way is then dropped. Where the map is scaled or turned, it begins anew; with another map
+    (`KeyframeSlam.reset`) it is gone.
     """
 
     map: SparseMap
     adjuster: MapAdjuster
+    loops: LoopCloser
     _due: bool = field(default=False, init=False)
     _work: SpreadAdjustment | None = field(default=None, init=False)
 
@@ -38,11 +41,6 @@ class WholeMap:
         self.drop()
         self.adjuster.adjust_all(inertial)
         return True
-
-    def loop_closed(self) -> None:
-        """A loop was closed: the adjustment of a large map goes on from the next image on."""
-        self.drop()
-        self._due = len(self.map.keyframes) > MOST_AT_ONCE
 
     def begin(self, inertial: bool) -> bool:
         """Adjust a small map at once, and a large one from the next image on, unless that is under
@@ -53,6 +51,11 @@ class WholeMap:
 
     def go_on(self, inertial: bool) -> bool:
         """Do a piece of work if there is any; returns whether the map was adjusted."""
+        if self.loops.under_way:
+            closed = self.loops.go_on()
+            if closed:
+                self._loop_closed()
+            return closed
         if not self._due:
             return False
         if self._work is None:
@@ -66,12 +69,21 @@ class WholeMap:
     def drop(self) -> None:
         """The whole map was adjusted otherwise: nothing is to be done."""
         self._due = False
-        self.begin_anew()
+        self._forget()
 
     def begin_anew(self) -> None:
-        """The map was moved: work under way is of no use."""
+        """The map was scaled or turned: work under way is of no use."""
+        self._forget()
+        self.loops.drop()
+
+    def _forget(self) -> None:
         self._work = None
         self.map.renumbers = True
+
+    def _loop_closed(self) -> None:
+        """The adjustment of a large map goes on from the next image on."""
+        self.drop()
+        self._due = len(self.map.keyframes) > MOST_AT_ONCE
 
 
 class SpreadAdjustment:

@@ -73,7 +73,7 @@ def pose_table(found: dict[str, Poses]) -> str:
         times = "-"
         if len(one.late_ms):
             times = ", ".join(f"{ms:.0f}" for ms in np.percentile(one.late_ms, [50, 95, 100]))
-        late = int((one.late_ms > MAX_LATE_MS).sum())
+        late = len(one.later_than(MAX_LATE_MS))
         lines.append(f"| {robot} | {times} | {late} | {one.dropped} | {100 * one.final_m:.2f} |")
     return "\n".join([*lines, ""])
 
@@ -85,9 +85,10 @@ def failed(watched: Watched, found: dict[str, Poses]) -> list[str]:
     if growth is not None and growth > MAX_GROWTH_MIB:
         lines.append(f"memory grew by {growth:.0f} MiB after the tenth minute")
     for robot, one in found.items():
-        late = int((one.late_ms > MAX_LATE_MS).sum())
+        late = one.later_than(MAX_LATE_MS)
         if late:
-            lines.append(f"{robot}: {late} poses came later than {MAX_LATE_MS:.0f} ms")
+            lines.append(f"{robot}: {len(late)} poses came later than {MAX_LATE_MS:.0f} ms")
+            lines += [f"  {late_ms:.0f} ms at {at_s:.2f} s" for at_s, late_ms in late]
         if one.dropped:
             lines.append(f"{robot}: {one.dropped} images were dropped")
     return lines

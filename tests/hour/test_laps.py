@@ -92,17 +92,19 @@ def test_a_recording_of_laps_is_whole(tmp_path: Path, monkeypatch: pytest.Monkey
 def test_what_is_beyond_a_limit_is_said() -> None:
     memory = [(60.0 * minute, 1000.0 + min(minute, 12)) for minute in range(61)]
     good = Watched(0, memory, 1300.0, "")
-    fine = Poses(np.array([20.0, 30.0]), 0, 0.001)
+    at_s = np.array([1.0, 61.5])
+    fine = Poses(np.array([20.0, 30.0]), at_s, 0, 0.001)
     assert failed(good, {"mav": fine}) == []
     assert good.growth_mib(600.0) == 2.0
     assert "| 50 | 1012 |" in memory_table(good, 3600.0)
     assert "| after the last image | 1300 |" in memory_table(good, 3600.0)
     grown = Watched(0, [*memory, (3601.0, 1061.0)], None, "")
-    late = Poses(np.array([20.0, 101.0]), 3, 0.001)
+    late = Poses(np.array([20.0, 101.0]), at_s, 3, 0.001)
     said = failed(grown, {"mav": fine, "ground": late})
     assert said == [
         "memory grew by 51 MiB after the tenth minute",
         "ground: 1 poses came later than 100 ms",
+        "  101 ms at 61.50 s",
         "ground: 3 images were dropped",
     ]
     assert "| ground | 60, 97, 101 | 1 | 3 | 0.10 |" in pose_table({"ground": late})

@@ -87,11 +87,13 @@ class Poses:
 
     Attributes:
         late_ms: (N,) time from each image to its pose [ms]; none where the run was not live.
+        at_s: (N,) when each of these images was taken, since the first [s].
         dropped: Number of images that were dropped.
         final_m: RMS error of the final positions [m].
     """
 
     late_ms: np.ndarray
+    at_s: np.ndarray
     dropped: int
     final_m: float
 
@@ -100,8 +102,14 @@ class Poses:
         """By the results of a run."""
         dropped = table.values(LIVE_STAGE, f"{robot}_dropped")
         final = table.values("trajectory", f"{robot}_final_ate_se3_rmse_m")
-        late_ms = table.values(LIVE_STAGE, f"{robot}_posed_ms")
-        return cls(late_ms, int(dropped.sum()), float(final[0]))
+        posed = table.rows(LIVE_STAGE, f"{robot}_posed_ms")
+        late_ms, at_s = (posed[name].to_numpy(np.float64) for name in ("value", "time_s"))
+        return cls(late_ms, at_s, int(dropped.sum()), float(final[0]))
+
+    def later_than(self, limit_ms: float) -> list[tuple[float, float]]:
+        """Time of each image whose pose came later [s], and how late that was [ms]."""
+        late = self.late_ms > limit_ms
+        return list(zip(self.at_s[late].tolist(), self.late_ms[late].tolist(), strict=True))
 
 
 def poses(out: Path) -> dict[str, Poses]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import count, takewhile
 
 import numpy as np
 import pytest
@@ -102,8 +103,18 @@ def test_a_map_that_slipped_is_straightened_when_the_robot_returns(
     def after(index: int) -> None:
         if index == SLIP_FRAME:
             slip(slam)
-            slam._mapper._reuse = lambda *_: False  # type: ignore[method-assign]
             slipped.append(slam.map.keyframes[-1].stamp_ns)
+            # Nothing but a closed loop leads back to old points.
+            slam._mapper._reuse = lambda *_: False  # type: ignore[method-assign]
+
+    def go_on() -> bool:
+        closed = piece()
+        if closed:
+            slam._mapper._reuse = reuse  # type: ignore[method-assign]
+        return closed
+
+    reuse, piece = slam._mapper._reuse, slam._loops.go_on
+    slam._loops.go_on = go_on  # type: ignore[method-assign]
 
     tracked = feed(sequence, front_end, after)
     off = off_m(sequence, tracked)
@@ -144,10 +155,14 @@ class Twin:
         self.before = loop_closure.MapSnapshot.of(self.slam.map)
         self.followed = self.slam.tracker.ids.copy()
 
-    def close(self) -> bool:
-        self.slam._loops._passed_over = loop_closure.EVERY - 1
+    def close(self, depth: bool = True) -> bool:
+        """Whether the newest keyframe, once all pieces are done, closes a loop."""
+        loops = self.slam._loops
+        loops._passed_over = loop_closure.EVERY - 1
         image = half_way().images[-1]
-        return self.slam._loops.close(image.depth, inertial=False)  # type: ignore[union-attr]
+        assert isinstance(image, GroundImage)
+        loops.consider(image.depth if depth else None, inertial=False)
+        return any(loops.go_on() for _ in takewhile(lambda _: loops.under_way, count()))
 
     def assert_unchanged(self) -> None:
         now, before = loop_closure.MapSnapshot.of(self.slam.map), self.before
@@ -206,18 +221,20 @@ def test_a_tilted_place_is_another_one_where_the_vertical_is_known(
     monkeypatch.setattr(loop_closure, "DRIFT_M", 100.0)
     monkeypatch.setattr(loop_closure, "MAX_TURN", np.pi)
     loops, slam = twin.slam._loops, twin.slam
-    place = slam._recovery.again(list(range(4)), np.empty(0, np.int64))
+    old, newest = list(range(4)), slam.map.keyframes[-1]
+    there = slam._recovery.recognize(newest, [slam.map.keyframes[k].stamp_ns for k in old])
+    assert there is not None
+    place = slam._recovery.again(newest, there, old, np.empty(0, np.int64))
     assert place is not None
-    old = list(range(4))
-    assert loops._believable(place, old, inertial=True)
-    newest = slam.map.keyframes[-1]
+    assert loops._believable(newest, place, old, inertial=True)
     tilt = SE3.from_rotation_vector((np.deg2rad(3.0), 0.0, 0.0))
     newest.state = newest.state.moved(tilt)
-    assert not loops._believable(place, old, inertial=True)
-    assert loops._believable(place, old, inertial=False)
+    assert not loops._believable(newest, place, old, inertial=True)
+    assert loops._believable(newest, place, old, inertial=False)
 
 
 def test_without_depth_or_accelerometer_no_loop_is_closed(twin: Twin) -> None:
-    twin.slam._loops._passed_over = loop_closure.EVERY - 1
-    assert not twin.slam._loops.close(None, inertial=False)
+    assert twin.slam._recovery.resembling(twin.slam.map.keyframes[-1], [0])
+    assert not twin.close(depth=False)
+    assert not twin.slam._loops.under_way
     twin.assert_unchanged()

@@ -185,3 +185,14 @@ def test_matching_agrees_with_counting_bits() -> None:
     near = distances < descriptors.VOTE_DISTANCE
     expected = [near[:, a:b].any(axis=1).sum() for a, b in itertools.pairwise(starts)]
     assert descriptors.votes(query, known, starts).tolist() == expected
+
+
+@pytest.mark.parametrize("first", [0, 32, 64, 96, 128, 160, 200])
+@pytest.mark.parametrize(("apart", "alike"), [(0, 1), (47, 1), (48, 0), (56, 0)])
+def test_a_vote_counts_differences_wherever_they_are(first: int, apart: int, alike: int) -> None:
+    rng = np.random.default_rng(11)
+    known = random_descriptors(1, rng)
+    bits = np.unpackbits(known.view(np.uint8))
+    bits[first : first + apart] ^= 1
+    query = np.packbits(bits).view(np.uint64).reshape(1, 4)
+    assert descriptors.votes(query, known, np.array([0, 1])).tolist() == [alike]

@@ -13,8 +13,11 @@ from airground.core.se3 import SE3
 from airground.slam import so3, spread_adjustment, warm_up
 from airground.slam.bundle_adjustment import Settings, adjust, adjusting
 from airground.slam.bundle_adjustment.solver import completed
+from airground.slam.feature_tracker import FeatureTracker
 from airground.slam.keyframe_slam import KeyframeSlam
+from airground.slam.loop_closure import LoopCloser
 from airground.slam.map_adjustment import SETTLING_NS
+from airground.slam.recovery import Recovery
 from airground.slam.rgbd import RgbdSlam
 from airground.slam.sparse_map import CANDIDATE, DROPPED, Keyframe, SparseMap
 from airground.slam.spread_adjustment import SpreadAdjustment, WholeMap
@@ -57,6 +60,12 @@ def finish(work: SpreadAdjustment) -> int:
     while not work.go_on():
         pieces += 1
     return pieces
+
+
+def whole_map(sparse_map: SparseMap, problem: Problem) -> WholeMap:
+    adjuster, own = adjuster_of(sparse_map, problem), (CAMERA, T_RIG_CAMERA, MonocularSlam())
+    recovery, tracker = Recovery(sparse_map, *own), FeatureTracker(own[2].patch_px, 1)
+    return WholeMap(sparse_map, adjuster, LoopCloser(sparse_map, tracker, adjuster, recovery, *own))
 
 
 @pytest.mark.parametrize("inertial", [False, True])
@@ -222,7 +231,7 @@ def test_a_small_map_is_adjusted_at_once_and_a_large_one_later(
     for most, at_once in ((6, True), (5, False)):
         monkeypatch.setattr(spread_adjustment, "MOST_AT_ONCE", most)
         sparse_map = bent(problem)
-        whole = WholeMap(sparse_map, adjuster_of(sparse_map, problem))
+        whole = whole_map(sparse_map, problem)
         assert not whole.go_on(False), "nothing was begun"
         states = [keyframe.state for keyframe in sparse_map.keyframes]
         assert whole.begin(False) == at_once
@@ -239,7 +248,7 @@ def test_work_under_way_is_dropped_or_begins_anew(monkeypatch: pytest.MonkeyPatc
     pieces = {}
     for name in ("undisturbed", "asked again", "moved", "at once"):
         sparse_map = bent(problem)
-        whole = WholeMap(sparse_map, adjuster_of(sparse_map, problem))
+        whole = whole_map(sparse_map, problem)
         whole.begin(False)
         for _ in range(5):
             assert not whole.go_on(False)

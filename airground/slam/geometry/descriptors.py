@@ -80,16 +80,21 @@ def _directions(image: U8, pixels: F64) -> F64:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _bits(x: np.uint64) -> np.uint64:
+    """Number of bits that are set."""
+    x = x - ((x >> np.uint64(1)) & PAIRS)
+    x = (x & NIBBLES) + ((x >> np.uint64(2)) & NIBBLES)
+    x = (x + (x >> np.uint64(4))) & BYTES
+    # Written this way, the compiler sees that one instruction counts bits.
+    return (x * ONES) >> np.uint64(56)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def hamming(a: U64, b: U64) -> int:
     """Number of different bits of two (4,) uint64 descriptors."""
     total = np.uint64(0)
     for i in range(4):
-        x = a[i] ^ b[i]
-        x = x - ((x >> np.uint64(1)) & PAIRS)
-        x = (x & NIBBLES) + ((x >> np.uint64(2)) & NIBBLES)
-        x = (x + (x >> np.uint64(4))) & BYTES
-        # Written this way, the compiler sees that one instruction counts bits.
-        total += (x * ONES) >> np.uint64(56)
+        total += _bits(a[i] ^ b[i])
     return int(total)
 
 
@@ -129,10 +134,18 @@ def votes(query: U64, known: U64, starts: I64) -> I64:
     `starts` (g + 1,) holds the index at which each group begins, and m."""
     counts = np.zeros(len(starts) - 1, np.int64)
     for g in range(len(counts)):
+        group = known[starts[g] : starts[g + 1]]
         for i in range(len(query)):
-            group = known[starts[g] : starts[g + 1]]
-            nearest = 257
-            for j in range(len(group)):
-                nearest = min(nearest, hamming(query[i], group[j]))
-            counts[g] += nearest < VOTE_DISTANCE
+            counts[g] += _has_likeness(query[i], group)
     return counts
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _has_likeness(descriptor: U64, group: U64) -> bool:
+    """Whether one of some descriptors (n, 4) differs from another in few bits."""
+    for j in range(len(group)):
+        # Half of the bits tell almost all others apart.
+        first = _bits(descriptor[0] ^ group[j, 0]) + _bits(descriptor[1] ^ group[j, 1])
+        if first < VOTE_DISTANCE and hamming(descriptor, group[j]) < VOTE_DISTANCE:
+            return True
+    return False

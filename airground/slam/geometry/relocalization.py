@@ -65,6 +65,9 @@ class KeyframeIndex:
     def __len__(self) -> int:
         return len(self._point_ids)
 
+    def __contains__(self, keyframe_id: int) -> bool:
+        return keyframe_id in self._point_ids
+
     def add(self, keyframe_id: int, image: U8, point_ids: I64, pixels: Floats) -> None:
         """Remember a keyframe by map points (n,) at pixels (n, 2); replaces its earlier entry."""
         self._point_ids[keyframe_id] = np.array(point_ids, np.int64)
