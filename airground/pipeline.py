@@ -35,6 +35,7 @@ from airground.dense.reconstruction import DenseReconstruction
 from airground.ground_map import FixedMap, GroundMap
 from airground.localization.height_map_pair import HeightMapPair
 from airground.localization.particle_filter import MonteCarloLocalizer
+from airground.localization.pose_errors import PoseErrors
 from airground.refinement import refine
 from airground.slam.front_end import TrackedPose, Tracking
 from airground.slam.straight_images import StraightImages
@@ -131,6 +132,8 @@ class Mapping:
             ground.stamp_ns,
             ground.T_map_camera,
             self.relative_heading(),
+            mav.covariance,
+            ground.covariance,
         )
 
 
@@ -228,6 +231,17 @@ def pair_of(sighting: Sighting, config: Config) -> HeightMapPair:
         sighting.T_ground_camera.translation[:2],
         sighting.heading,
         config,
+        pose_errors_of(sighting),
+    )
+
+
+def pose_errors_of(sighting: Sighting) -> PoseErrors:
+    """How well SLAM knew both robots' poses when a surface was finished."""
+    surface, nothing = sighting.surface, np.zeros((6, 6))
+    return PoseErrors(
+        surface.T_mav_camera.translation - surface.cloud_mav.points.mean(axis=0, dtype=np.float64),
+        nothing if sighting.covariance_mav is None else sighting.covariance_mav,
+        nothing if sighting.covariance_ground is None else sighting.covariance_ground,
     )
 
 

@@ -73,7 +73,8 @@ class Belief:
         stamp_ns: Stamp of the newest aerial surface in this belief [ns].
         particles: (M, 3) float64: x, y [m] and heading [rad] of `mav` in `ground`.
         estimate: (3,) float64: the reported x, y, heading.
-        covariance: (2, 2) float64 covariance of x and y [m^2].
+        covariance: (2, 2) float64 covariance of x and y [m^2]: of the particles and, beyond what
+            they can show, by the errors of the robots' poses.
         cost: Cost at the estimate, NaN where the overlap is too small.
         height_offset: Delta z of Sec. VI-A [m], to be added to heights in `mav`.
         T_ground_mav: The estimate as a motion between the robots' maps.
@@ -101,7 +102,7 @@ class Belief:
     @property
     def spread_m(self) -> float:
         """Standard deviation of the particles' positions [m] (Fig. 12)."""
-        return float(np.sqrt(np.trace(self.covariance)))
+        return float(np.sqrt(self.particles[:, :2].var(axis=0, ddof=1).sum()))
 
 
 @dataclass(frozen=True, eq=False)

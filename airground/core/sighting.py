@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from airground.core.arrays import F64
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
 from airground.core.surface import AerialSurface
@@ -19,6 +20,8 @@ class Sighting:
         T_mav_camera: Pose of the MAV's camera at `mav_stamp_ns`, when the surface was finished.
         T_ground_camera: Newest pose of the ground robot's camera, at `ground_stamp_ns`.
         heading: Turn of `mav` in `ground` by the magnetometers [rad], None if unknown.
+        covariance_mav, covariance_ground: (6, 6) covariances of these poses: position [m] and
+            rotation [rad], in the axes of `mav` and of `ground`; None where SLAM states none.
     """
 
     surface: AerialSurface
@@ -28,3 +31,5 @@ class Sighting:
     ground_stamp_ns: int
     T_ground_camera: SE3
     heading: float | None
+    covariance_mav: F64 | None = None
+    covariance_ground: F64 | None = None

@@ -15,6 +15,7 @@ from airground.core.height_map import make_height_map
 from airground.errors import InputError
 from airground.localization.cost_map import Overlays, overlay_at, overlay_turned, reach_of
 from airground.localization.hypotheses import CostVolume, search_headings, search_positions
+from airground.localization.pose_errors import PoseErrors
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +32,7 @@ class HeightMapPair:
         ground_robot_position: (2,) centre of the search region in `ground` [m].
         heading: Turn of `mav` in `ground` [rad]; not used where it is searched.
         config: The pipeline's parameters; height maps and localization are used.
+        pose_errors: How well both robots' poses are known.
     """
 
     stamp_ns: int
@@ -40,6 +42,7 @@ class HeightMapPair:
     ground_robot_position: F64
     heading: float | None
     config: Config
+    pose_errors: PoseErrors = field(default_factory=PoseErrors.none)
     _joined: dict[tuple[int, ...], HeightMapPair] = field(default_factory=dict, repr=False)
 
     def joined(self, earlier: Sequence[HeightMapPair]) -> HeightMapPair:

@@ -122,7 +122,7 @@ class MonteCarloLocalizer:
             stamp_ns=pair.stamp_ns,
             particles=particles,
             estimate=estimate,
-            covariance=np.cov(particles[:, :2].T),
+            covariance=np.cov(particles[:, :2].T) + pair.pose_errors.covariance(estimate[2]),
             cost=float(overlay.costs(self._local)[0]),
             height_offset=offset,
             T_ground_mav=motion_at(estimate, pair.position_mav, offset),

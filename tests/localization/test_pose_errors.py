@@ -1,0 +1,94 @@
+"""Errors of poses move the place where maps fit, by as much as the covariance says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from airground.config import Config
+from airground.core.se3 import SE3
+from airground.localization.height_map_pair import HeightMapPair
+from airground.localization.particle_filter import MonteCarloLocalizer
+from airground.localization.pose_errors import PoseErrors
+
+HEIGHT_M, TILT, HEADING = 2.0, np.deg2rad(0.3), 0.7
+NOTHING = np.zeros((6, 6))
+
+
+def tilted(sigma: float = TILT) -> np.ndarray:
+    return np.diag([0, 0, 0, sigma, sigma, 0.0]) ** 2
+
+
+def test_a_tilt_moves_the_camera_by_its_height() -> None:
+    over = np.array([0.0, 0.0, HEIGHT_M])
+    expected = (HEIGHT_M * TILT) ** 2 * np.eye(2)
+    for one in (PoseErrors(over, tilted(), NOTHING), PoseErrors(over, NOTHING, tilted())):
+        np.testing.assert_allclose(one.covariance(HEADING), expected, atol=1e-12)
+    both = PoseErrors(over, tilted(), tilted()).covariance(HEADING)
+    np.testing.assert_allclose(both, 2.0 * expected, atol=1e-12)
+
+
+def test_a_heading_moves_what_is_not_over_the_middle() -> None:
+    beside = np.array([0.5, 0.0, HEIGHT_M])
+    turned = np.diag([0, 0, 0, 0, 0, TILT]) ** 2
+    expected = np.diag([0.0, (0.5 * TILT) ** 2])
+    np.testing.assert_allclose(PoseErrors(beside, turned, NOTHING).covariance(0.0), expected)
+    expected = np.diag([(0.5 * TILT) ** 2, 0.0])
+    quarter = PoseErrors(beside, turned, NOTHING).covariance(np.pi / 2)
+    np.testing.assert_allclose(quarter, expected, atol=1e-12)
+
+
+def test_the_position_counts_of_the_ground_robot_only() -> None:
+    """The aerial surface moves with the MAV's camera."""
+    moved = np.diag([0.03, 0.01, 0.02, 0, 0, 0]) ** 2
+    assert not PoseErrors(np.zeros(3), moved, NOTHING).covariance(HEADING).any()
+    of_ground = PoseErrors(np.zeros(3), NOTHING, moved).covariance(HEADING)
+    np.testing.assert_allclose(of_ground, moved[:2, :2])
+    assert not PoseErrors.none().covariance(HEADING).any()
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_the_covariance_is_that_of_drawn_errors(seed: int) -> None:
+    """The slow twin: the surface's middle stays, and the camera is where erroneous poses put it."""
+    rng = np.random.default_rng(seed)
+    roots = rng.normal(0, 0.004, (2, 6, 6))
+    of_mav, of_ground = (root @ root.T for root in roots)
+    lever = rng.normal(0, 1.0, 3)
+    errors = PoseErrors(lever, of_mav, of_ground)
+    turn = SE3.from_heading(HEADING)
+    camera = turn @ lever
+    drawn = np.empty((20_000, 2))
+    for row in drawn:
+        of_both = [root @ rng.normal(size=6) for root in roots]
+        leaned = turn @ SE3.from_rotation_vector(of_both[0][3:]) @ lever - camera
+        moved = SE3.from_rotation_vector(of_both[1][3:], of_both[1][:3]) @ camera - camera
+        row[:] = (leaned + moved)[:2]
+    np.testing.assert_allclose(
+        np.cov(drawn.T), errors.covariance(HEADING), rtol=0.05, atol=0.02 * np.var(drawn)
+    )
+
+
+def test_a_belief_contains_them() -> None:
+    """Beyond what its particles show, and without another claim or place."""
+    rng = np.random.default_rng(3)
+    points = rng.uniform(-1, 1, (20_000, 3)).astype(np.float32)
+    points[:, 2] = 0.3 * (np.hypot(points[:, 0], points[:, 1] - 0.2) < 0.5)
+    beliefs = []
+    for errors in (
+        PoseErrors.none(),
+        PoseErrors(np.array([0, 0, HEIGHT_M]), tilted(), tilted()),
+    ):
+        pair = HeightMapPair(
+            1, points, np.zeros(3), points, np.zeros(2), 0.0, Config(), pose_errors=errors
+        )
+        filter_ = MonteCarloLocalizer(Config(), np.random.default_rng(4))
+        for _ in filter_.update(pair):
+            pass
+        assert filter_.belief is not None
+        beliefs.append(filter_.belief)
+    without, with_errors = beliefs
+    added = with_errors.covariance - without.covariance
+    np.testing.assert_allclose(added, 2 * (HEIGHT_M * TILT) ** 2 * np.eye(2), atol=1e-12)
+    np.testing.assert_array_equal(with_errors.particles, without.particles)
+    assert with_errors.spread_m == without.spread_m
+    assert with_errors.converged == without.converged
