@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
-from itertools import count as count_up
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from evaluation.setup.environment import prepare
+
+if TYPE_CHECKING:
+    from tests.negatives.campaign import Outcome
 
 
 def main() -> int:
     prepare(1)
-    from airground.config import Config
-    from tests.negatives.campaign import ORDER, outcomes, table
+    from tests.negatives.campaign import MAPS, ORDER, table, tried
     from tests.negatives.flights import flights
     from tests.negatives.kinds import NEGATIVES
 
@@ -24,22 +31,36 @@ def main() -> int:
     words.add_argument("--heaps", type=int, default=8, help="flights, each over its own heap")
     words.add_argument("--maps", type=Path, default=Path("negatives"), help="folder of their maps")
     words.add_argument("--case", type=int, help="only this case, with every line")
+    words.add_argument("--workers", type=int, default=2, help="processes that try cases")
     asked = words.parse_args()
-    if min(asked.count, asked.heaps) < 1 or min(asked.seed, asked.first, asked.case or 0) < 0:
-        words.error("--count and --heaps must be at least 1, other numbers at least 0")
-    flown = flights(asked.heaps, asked.maps)
-    found, tried = [], 0
-    numbers = count_up(asked.first) if asked.case is None else [asked.case]
-    for number in numbers:
-        for one in outcomes(asked.seed, [number], flown, Config()):
-            found.append(one)
-            tried += one.kind in NEGATIVES
-            if one.is_wrong or asked.case is not None:
-                print(one.line(), flush=True)
-        if tried >= asked.count and number % len(ORDER) == len(ORDER) - 1:
-            break
+    least = min(asked.count, asked.heaps, asked.workers)
+    if least < 1 or min(asked.seed, asked.first, asked.case or 0) < 0:
+        words.error("--count, --heaps and --workers must be at least 1, other numbers at least 0")
+    flights(asked.heaps, asked.maps)  # made once, for all processes
+    rounds = math.ceil(asked.count / (MAPS * sum(kind in NEGATIVES for kind in ORDER)))
+    numbers = range(asked.first, asked.first + rounds * len(ORDER))
+    if asked.case is not None:
+        numbers = range(asked.case, asked.case + 1)
+    found: list[Outcome] = []
+    for one in _in_order(
+        numbers, asked.workers, partial(tried, asked.seed, asked.heaps, asked.maps)
+    ):
+        found.append(one)
+        if one.is_wrong or asked.case is not None:
+            print(one.line(), flush=True)
     print(table(found))
     return int(any(one.is_wrong for one in found))
+
+
+def _in_order(
+    numbers: Sequence[int], workers: int, one: partial[list[Outcome]]
+) -> Iterator[Outcome]:
+    """The outcomes of cases in their order, whatever the number of processes."""
+    # A process that is forked would share the threads of libraries.
+    started = get_context("spawn"), prepare, (1,)
+    with ProcessPoolExecutor(min(workers, len(numbers)), *started) as pool:
+        for outcomes in pool.map(one, numbers, chunksize=4):
+            yield from outcomes
 
 
 if __name__ == "__main__":

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from evaluation.setup.setups import with_localization
 from evaluation.table.intervals import wilson
 from evaluation.table.limits import LOCATED_M, is_good_pose
 from evaluation.table.truth_errors import PoseError, relative_error
+from tests.negatives.flights import flights
 from tests.negatives.kinds import NEGATIVES, PLACES
 from tests.negatives.views import Flown, Points, View
 
@@ -74,6 +77,16 @@ class Outcome:
             f"#{self.number} {self.kind}, heading {heading}, map {self.step}: "
             f"{verdict}{place}; alignment: {aligned}"
         )
+
+
+def tried(seed: int, heaps: int, maps: Path, number: int) -> list[Outcome]:
+    """What becomes of one case, in a process of its own; `maps` is the folder of the flights'."""
+    return list(outcomes(seed, [number], _flown(heaps, maps), Config()))
+
+
+@cache
+def _flown(heaps: int, maps: Path) -> list[Flown]:
+    return flights(heaps, maps)
 
 
 def outcomes(

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import cv2
@@ -17,16 +17,21 @@ import numpy as np
 import pytest
 
 from airground.config import Config, GroundMapping
+from airground.core.se3 import SE3
 from airground.io.header import write_toml
 from airground.io.recording import Recording
 from evaluation.judge.live_summary import LiveSummary, live_summary
+from evaluation.run.claim_log import ClaimLog
 from evaluation.run.drops import nothing_dropped
+from evaluation.run.live import live_run
 from evaluation.run.live.live_run import run_live
 from evaluation.run.live.playback import Playback
 from evaluation.run.live.radio_link import RadioLimits
+from evaluation.run.onlooker import Seen
 from evaluation.run.recording import RunResult, run_recording
 from evaluation.setup import console
 from evaluation.setup.setups import Setup
+from evaluation.table.tracking_log import Tracked
 from sim.recording.truth import Truth
 from tests.io.recordings import HEIGHT, UNITS_PER_M, WIDTH, calibration, write_recording
 from tests.sim.flights import simulate, small_scene
@@ -85,6 +90,31 @@ def test_a_live_run_with_drops_is_reproduced_offline(recording: Recording) -> No
     assert summary.mav.lost == len(drops.unmapped.mav) == 4 - summary.mav.dropped
     assert summary.mav.mapped_ms.n == 0
     assert_same(live, run_recording(recording, truth, SETUP, 0, drops))
+
+
+def test_claims_of_a_live_run_count_from_when_they_were_computed(
+    recording: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = [(5, SE3.identity())]
+    computed_ns: list[int] = []
+    stamps_ns: list[int] = []
+
+    class Watched(ClaimLog):
+        def see(self, seen: Seen) -> None:
+            computed_ns.append(self._when(seen))
+            stamps_ns.append(seen.frame.stamp_ns)
+
+        def claims(self, tracked: Mapping[str, Tracked]) -> list[tuple[int, SE3]]:
+            assert sorted(tracked) == ["ground", "mav"]
+            return made
+
+    monkeypatch.setattr(live_run, "ClaimLog", Watched)
+    playback = Playback(rate=1000.0, waiting_frames=100, patience_s=PATIENCE_S)
+    live, _ = run_live(recording, Truth.open(recording.path), SETUP, 0, playback)
+    assert live.claims == made
+    assert len(stamps_ns) >= 8, "the events of four images of each robot"
+    assert all(late > stamp for late, stamp in zip(computed_ns, stamps_ns, strict=True))
+    assert computed_ns == sorted(computed_ns)
 
 
 def assert_same(one: RunResult, two: RunResult) -> None:
