@@ -211,7 +211,7 @@ def test_each_message_appears_once(read: ReadBack) -> None:
         "ground robot: has no map yet",
         "ground robot: tracked",
         "MAV: tracked",
-        "particles: converged, spread 0.22 m",
+        "particles: converged, spread 0.14 m",
         "alignment: accepted, 90% inliers, 6 mm",
         "map: 3 aerial points added",
         "MAV: lost",

@@ -17,7 +17,7 @@ from evaluation.table.truth_errors import PoseError
 
 ONE = SE3.identity()
 BELIEF = Belief(
-    3_250_000_000, np.zeros((1, 3)), np.zeros(3), np.eye(2), 0.0, 0.0, ONE, False, "spread too wide"
+    3_250_000_000, np.zeros((2, 3)), np.zeros(3), np.eye(2), 0.0, 0.0, ONE, False, "spread too wide"
 )
 ERROR = PoseError(0.3, 0.2, 1.5)
 
