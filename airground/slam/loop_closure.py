@@ -103,6 +103,8 @@ class LoopCloser:
             return False
         yield
         old = self._old(keyframe)
+        if not old:
+            return False
         found = self.recovery.again(keyframe, T_map_camera, old, self._recent(keyframe))
         if found is None or not self._believable(keyframe, found, old, inertial):
             return False
@@ -153,7 +155,7 @@ class LoopCloser:
         self, keyframe: Keyframe, found: Found, old: int, depth: F32 | None, inertial: bool
     ) -> bool:
         """Pose graph, then bundle adjustment of everything; undone if the loop does not fit. Of a
-        large map only the first steps are taken: `WholeMap.loop_closed` goes on. The next keyframe
+        large map only the first steps are taken: `WholeMap.go_on` goes on. The next keyframe
         finds the old points by projection."""
         before = MapSnapshot.of(self.map)
         T_map_rig = found.fit.T_map_camera @ self.T_rig_camera.inverse()
