@@ -192,7 +192,7 @@ class Localization(Section):
     """Smallest overlap, as a fraction of the aerial map's filled cells."""
     search_radius_m: Positive = 3.0
     """Half the side of the square searched around the ground robot [m]."""
-    particles: Count = 200
+    particles: Annotated[int, Field(ge=2)] = 200
     """M of Eq. 4."""
     motion_noise_m: Positive = 0.03
     """Standard deviation of the motion model per axis [m] (Eq. 6)."""

@@ -10,7 +10,7 @@ import pytest
 
 from airground.config import Config, GroundMapping
 from airground.core.camera import PinholeCamera
-from airground.core.cloud import Source
+from airground.core.cloud import PointCloud, Source
 from airground.core.events import (
     Event,
     GroundMapExtended,
@@ -28,10 +28,11 @@ from airground.core.messages import (
     Stamped,
 )
 from airground.core.se3 import SE3
+from airground.core.surface import AerialSurface
 from airground.core.trajectory import Trajectory
 from airground.dense.reconstruction import DenseReconstruction
 from airground.ground_map import GroundMap
-from airground.pipeline import Mapping
+from airground.pipeline import Mapping, pose_errors_of
 from airground.slam.front_end import ScaleEstimate, TrackedPose, Tracking
 from airground.tracking import FrontEnds, TrackedFrame, Trackers
 
@@ -192,6 +193,29 @@ def test_the_ground_map_follows_corrected_poses() -> None:
     for image, pose in zip(images, (at(0.05), at(0.2)), strict=True):
         expected.add(image, pose)
     assert made.mapping.ground_cloud().points.tobytes() == expected.cloud().points.tobytes()
+
+
+def test_a_sighting_has_both_poses_and_how_sure_slam_was_of_them() -> None:
+    made = Fed(
+        Scripted([tracked(0, 0.1), tracked(2, 0.3)]),
+        Scripted([replace(tracked(1, 0.2), covariance=4 * COVARIANCE)]),
+    )
+    cloud = PointCloud(np.zeros((1, 3), np.float32), np.zeros((1, 3), np.uint8))
+    depth = np.full((120, 160), 2.0, np.float32)
+    surface = AerialSurface(2, 0, CAMERA, at(0.1), depth, cloud, 3)
+    made.add(mav_image(0))
+    assert made.mapping.sight(surface) is None  # the ground robot has no pose yet
+    made.add(Stamped(Source.GROUND, ground_image(1)))
+    made.add(mav_image(2))
+    sighting = made.mapping.sight(surface)
+    assert sighting is not None
+    assert (sighting.mav_stamp_ns, sighting.ground_stamp_ns) == (2, 1)
+    assert sighting.T_mav_camera.translation[0] == 0.3
+    assert sighting.T_ground_camera.translation[0] == 0.2
+    errors = pose_errors_of(sighting)
+    np.testing.assert_array_equal(errors.of_mav, COVARIANCE)
+    np.testing.assert_array_equal(errors.of_ground, 4 * COVARIANCE)
+    np.testing.assert_allclose(errors.lever_mav, [0.1, 0.0, 0.0])
 
 
 def test_what_the_front_ends_put_off_reaches_the_map_at_the_end() -> None:

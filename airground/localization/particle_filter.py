@@ -195,6 +195,8 @@ def _why_spread(particles: F64, config: Localization) -> str:
         if mode.mean() < config.min_mode_share:
             return f"particles split: only {mode.mean():.0%} of them agree on a place"
         counted = particles[mode]
+    if len(counted) < 2:
+        return "particles split: no two of them agree on a place"
     spread_m = float(np.sqrt(np.trace(np.cov(counted[:, :2].T))))
     if spread_m > config.converged_spread_m:
         return f"particles split: they are still spread over {spread_m:.2f} m"

@@ -141,11 +141,11 @@ class Reproduce(
             resumable_folder(self.out) as folder,
             Crew(self.cluster, self.workers(), plan.tasks(), folder.scratch) as crew,
         ):
+            recordings = self.recordings or folder.recordings
             announce(
                 f"measures {plan.tasks()} passes over {len(plan.flights)} flights",
-                work_s(self._core_s(plan), self.workers()),
+                work_s(self._core_s(plan, recordings), self.workers()),
             )
-            recordings = self.recordings or folder.recordings
             found = plan.measured(None if self.render else recordings, folder.store, crew)
             mark = None if level is None else level.mark
             results = Results(found.table, setup.config, seed, found.showcase, level=mark)
@@ -243,10 +243,14 @@ class Reproduce(
     def _count(self, word: str, asked: int | None, usual: int, low: int = 1) -> int:
         return usual if asked is None else int(in_range(word, asked, low=low))
 
-    def _core_s(self, plan: Plan) -> float:
+    def _core_s(self, plan: Plan, recordings: Path) -> float:
         """Work to be expected at most, for what is finished already is not done again [s]."""
-        flights = plan.flights
-        recorded_s = sum(flight.duration_s or flight.scene.duration_s for flight in flights)
-        measured_s = recorded_s * plan.tasks() / len(flights)
-        rendered_s = measured_s if self.render else recorded_s
+        from evaluation.measure.work.measure import recording_name
+
+        def seconds(flights: list[Flight]) -> float:
+            return sum(flight.duration_s or flight.scene.duration_s for flight in flights)
+
+        missing = [f for f in plan.flights if not (recordings / recording_name(f)).exists()]
+        measured_s = seconds(plan.flights) * plan.tasks() / len(plan.flights)
+        rendered_s = measured_s if self.render else seconds(missing)
         return rendered_s * RENDER_S_PER_S + measured_s * MEASURE_S_PER_S

@@ -72,10 +72,15 @@ class Step:
 
     @property
     def left_s(self) -> float | None:
-        """Estimate of the time left [s], the command's until there is a rate; None if unknown."""
+        """Estimate of the time left [s], the command's until there is a rate; None if unknown.
+        Work of unknown extent that follows other work has no estimate: what was expected of the
+        command has been too long or too short by then.
+        """
         gained = self.done - self._before
         if self.total is not None and gained > 0:
             return max(0.0, self.elapsed_s / gained * (self.total - self.done))
+        if self.total is None and _some_done:
+            return None
         left_s = 0.0 if _due is None else _due - time.monotonic()
         return left_s if left_s > 0 else None
 
@@ -97,6 +102,7 @@ class Step:
 _open_steps: list[Step] = []
 _display: _Plain | _Bars | None = None
 _due: float | None = None  # when the command ought to be done, by time.monotonic
+_some_done = False  # whether work of known extent has ended
 
 
 @contextmanager
@@ -104,6 +110,7 @@ def step(
     what: str, total: float | None = None, unit: str = "", done: float = 0.0
 ) -> Iterator[Step]:
     """A step that is shown, inside `shown`, until the block ends; arguments as of `Step`."""
+    global _some_done
     opened = Step(what, total, unit, done)
     _open_steps.append(opened)
     if _display is not None:
@@ -112,6 +119,7 @@ def step(
         yield opened
     finally:
         _open_steps.remove(opened)
+        _some_done |= _display is not None and total is not None
         if _display is not None:
             _display.end(opened)
 
@@ -127,13 +135,14 @@ def announce(what: str, expected_s: float | None = None) -> None:
 @contextmanager
 def shown() -> Iterator[None]:
     """Show every step that is open during the block."""
-    global _display, _due
+    global _display, _due, _some_done
     _display = _Bars(stderr()) if stderr().is_terminal else _Plain()
     try:
         yield
     finally:
         _display.close()
         _display = _due = None
+        _some_done = False
 
 
 @cache

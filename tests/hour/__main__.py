@@ -47,6 +47,7 @@ def main() -> int:
         found = poses(out)
     print(memory_table(watched, asked.duration))
     print(pose_table(found))
+    print(f"The machine lost {1e-3 * watched.stolen_ms(0.0, np.inf):.1f} s to its hypervisor.\n")
     failures = failed(watched, found)
     print("\n".join(failures))
     return int(bool(failures))
@@ -88,7 +89,11 @@ def failed(watched: Watched, found: dict[str, Poses]) -> list[str]:
         late = one.later_than(MAX_LATE_MS)
         if late:
             lines.append(f"{robot}: {len(late)} poses came later than {MAX_LATE_MS:.0f} ms")
-            lines += [f"  {late_ms:.0f} ms at {at_s:.2f} s" for at_s, late_ms in late]
+            lines += [
+                f"  {late_ms:.0f} ms at {at_s:.2f} s; "
+                f"the machine lost {watched.stolen_ms(at_s):.0f} ms around it"
+                for at_s, late_ms in late
+            ]
         if one.dropped:
             lines.append(f"{robot}: {one.dropped} images were dropped")
     return lines

@@ -98,13 +98,14 @@ def test_what_is_beyond_a_limit_is_said() -> None:
     assert good.growth_mib(600.0) == 2.0
     assert "| 50 | 1012 |" in memory_table(good, 3600.0)
     assert "| after the last image | 1300 |" in memory_table(good, 3600.0)
-    grown = Watched(0, [*memory, (3601.0, 1061.0)], None, "")
+    stolen = [(60.9, 0.0), (61.1, 10.0), (61.9, 40.0), (62.1, 90.0)]
+    grown = Watched(0, [*memory, (3601.0, 1061.0)], None, "", stolen)
     late = Poses(np.array([20.0, 101.0]), at_s, 3, 0.001)
     said = failed(grown, {"mav": fine, "ground": late})
     assert said == [
         "memory grew by 51 MiB after the tenth minute",
         "ground: 1 poses came later than 100 ms",
-        "  101 ms at 61.50 s",
+        "  101 ms at 61.50 s; the machine lost 30 ms around it",
         "ground: 3 images were dropped",
     ]
     assert "| ground | 60, 97, 101 | 1 | 3 | 0.10 |" in pose_table({"ground": late})

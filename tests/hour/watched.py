@@ -5,7 +5,11 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from dataclasses import dataclass
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +23,7 @@ CLI = "from evaluation.cli import main; main()"
 PROGRESS = re.compile(r"running: (\d+)/(\d+) images")
 """A line of the command's progress; one comes every ten seconds."""
 ROBOTS = ("mav", "ground")
+STEAL_PERIOD_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -30,12 +35,15 @@ class Watched:
         memory: Recorded time that had passed [s], and memory then, shared pages once [MiB].
         at_end_mib: The most after the last image, when the results are put together [MiB].
         said: The end of what it printed.
+        stolen: Recorded time that had passed [s], and how long the hypervisor had kept cores from
+            this machine by then, all cores together [ms].
     """
 
     code: int
     memory: list[tuple[float, float]]
     at_end_mib: float | None
     said: str
+    stolen: list[tuple[float, float]] = field(default_factory=list)
 
     def held_mib(self, at_s: float) -> float | None:
         """Memory once so much was tracked; None if it was not read after that."""
@@ -46,6 +54,11 @@ class Watched:
         later = [mib for time_s, mib in self.memory if time_s >= since_s]
         return max(later) - later[0] if len(later) > 1 else None
 
+    def stolen_ms(self, at_s: float, around_s: float = 0.5) -> float:
+        """Time that the hypervisor kept cores from this machine around a recorded time [ms]."""
+        near = [ms for time_s, ms in self.stolen if abs(time_s - at_s) <= around_s]
+        return near[-1] - near[0] if near else 0.0
+
 
 def watch(words: list[str], duration_s: float) -> Watched:
     """Run `airground WORDS` over a recording of this length, to its end."""
@@ -53,9 +66,13 @@ def watch(words: list[str], duration_s: float) -> Watched:
     memory: list[tuple[float, float]] = []
     at_end_mib: float | None = None
     said: list[str] = []
-    with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=ROOT
-    ) as process:
+    started_s = np.inf
+    with (
+        _steal_clock() as stolen,
+        subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=ROOT
+        ) as process,
+    ):
         assert process.stdout is not None
         for line in process.stdout:
             said.append(line)
@@ -64,13 +81,34 @@ def watch(words: list[str], duration_s: float) -> Watched:
                 continue
             mib = resident_mib(_processes(process.pid))
             done, total = int(match[1]), int(match[2])
+            started_s = min(started_s, time.monotonic() - duration_s * done / total)
             if mib is None:
                 continue
             if done == total:
                 at_end_mib = max(mib, at_end_mib or 0.0)
             else:
                 memory.append((duration_s * done / total, mib))
-    return Watched(process.returncode, memory, at_end_mib, "".join(said[-5:]))
+    passed = [(wall_s - started_s, ms) for wall_s, ms in stolen]
+    return Watched(process.returncode, memory, at_end_mib, "".join(said[-5:]), passed)
+
+
+@contextmanager
+def _steal_clock() -> Iterator[list[tuple[float, float]]]:
+    """Monotonic time [s] and stolen time of all cores [ms], read while the context lasts."""
+    readings: list[tuple[float, float]] = []
+    ended = threading.Event()
+
+    def read() -> None:
+        while not ended.wait(STEAL_PERIOD_S):
+            readings.append((time.monotonic(), 1e3 * getattr(psutil.cpu_times(), "steal", 0.0)))
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    try:
+        yield readings
+    finally:
+        ended.set()
+        reader.join()
 
 
 def _processes(first: int) -> list[int]:

@@ -141,6 +141,20 @@ def test_the_same_correlation_may_be_chance_over_a_small_overlap():
     assert refusal(625, changed(Config(), cost="ncc", sigma=0.05)) == ""
 
 
+def test_one_particle_agrees_with_nobody() -> None:
+    config = changed(Config(), min_mode_share=0.3).localization
+    cells = 2500
+    sums = np.array([[cells, 0, 0, 0.01 * cells, 0.01 * cells, 0.009 * cells]], np.float64)
+    overlay = Overlays(sums, 0.0, 0.0, cells, cells_per_m=25.0)
+
+    def refusal(*x: float) -> str:
+        particles = np.array([[place, 0.0, 0.0] for place in x])
+        return why_refused(overlay, Agreement(cells, 1.0, 0.0), particles, config)
+
+    assert refusal(0.0, 2.0) == "particles split: no two of them agree on a place"
+    assert refusal(0.0, 0.01) == ""
+
+
 def test_a_map_without_overlap_neither_kills_the_belief_nor_claims(flight):
     localizer = MonteCarloLocalizer(Config(), np.random.default_rng(0))
     robot = np.zeros(2)

@@ -20,9 +20,12 @@ if TYPE_CHECKING:
 
 def main() -> int:
     prepare(1)
-    from tests.negatives.campaign import MAPS, ORDER, table, tried
+    from airground.config import Config
+    from evaluation.show.figures.style import write_png
+    from tests.negatives.campaign import MAPS, ORDER, table, tried, tries
     from tests.negatives.flights import flights
     from tests.negatives.kinds import NEGATIVES
+    from tests.negatives.picture import tries_figure
 
     words = argparse.ArgumentParser(prog="python -m tests.negatives", description=__doc__)
     words.add_argument("--count", type=int, default=4000, help="aerial maps without a place")
@@ -31,12 +34,19 @@ def main() -> int:
     words.add_argument("--heaps", type=int, default=8, help="flights, each over its own heap")
     words.add_argument("--maps", type=Path, default=Path("negatives"), help="folder of their maps")
     words.add_argument("--case", type=int, help="only this case, with every line")
+    words.add_argument("--picture", type=Path, help="PNG file of its wrong maps, or of its last")
     words.add_argument("--workers", type=int, default=2, help="processes that try cases")
     asked = words.parse_args()
     least = min(asked.count, asked.heaps, asked.workers)
     if least < 1 or min(asked.seed, asked.first, asked.case or 0) < 0:
         words.error("--count, --heaps and --workers must be at least 1, other numbers at least 0")
-    flights(asked.heaps, asked.maps)  # made once, for all processes
+    if asked.picture is not None and asked.case is None:
+        words.error("--picture is of one case; give --case")
+    flown = flights(asked.heaps, asked.maps)  # made once, for all processes
+    if asked.picture is not None:
+        made = list(tries(asked.seed, [asked.case], flown, Config()))
+        wrong = [one for one in made if one.outcome.is_wrong]
+        write_png(tries_figure(wrong or made[-1:]), asked.picture)
     rounds = math.ceil(asked.count / (MAPS * sum(kind in NEGATIVES for kind in ORDER)))
     numbers = range(asked.first, asked.first + rounds * len(ORDER))
     if asked.case is not None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from airground.config import Config
-from airground.core.belief import Alignment
+from airground.core.belief import Alignment, Belief
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
 from airground.localization.height_map_pair import HeightMapPair
@@ -79,6 +79,15 @@ class Outcome:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class Try:
+    """An outcome, with what led to it."""
+
+    outcome: Outcome
+    view: View
+    belief: Belief
+
+
 def tried(seed: int, heaps: int, maps: Path, number: int) -> list[Outcome]:
     """What becomes of one case, in a process of its own; `maps` is the folder of the flights'."""
     return list(outcomes(seed, [number], _flown(heaps, maps), Config()))
@@ -93,6 +102,14 @@ def outcomes(
     seed: int, numbers: Iterable[int], flown: Sequence[Flown], config: Config
 ) -> Iterator[Outcome]:
     """What becomes of each aerial map of each case, where the heading is known or searched."""
+    for one in tries(seed, numbers, flown, config):
+        yield one.outcome
+
+
+def tries(
+    seed: int, numbers: Iterable[int], flown: Sequence[Flown], config: Config
+) -> Iterator[Try]:
+    """The same, with what led to it."""
     for number in numbers:
         rng = np.random.default_rng([seed, number])
         kind = ORDER[number % len(ORDER)]
@@ -104,7 +121,7 @@ def outcomes(
 
 def _try(
     number: int, kind: str, views: Sequence[View], config: Config, rng: np.random.Generator
-) -> Iterator[Outcome]:
+) -> Iterator[Try]:
     localizer = MonteCarloLocalizer(config, rng)
     for step, view in enumerate(views, 1):
         pair = HeightMapPair(
@@ -120,7 +137,7 @@ def _try(
             aerial, ground = _cloud(view.aerial), _cloud(view.ground)
             alignment = refine(step, belief.T_ground_mav, aerial, ground, config)
         accepted = alignment is not None and alignment.accepted
-        yield Outcome(
+        outcome = Outcome(
             number=number,
             step=step,
             kind=kind,
@@ -133,6 +150,7 @@ def _try(
             refusals=(belief.refusal, "" if alignment is None else alignment.refusal),
             off_m=located.horizontal_m,
         )
+        yield Try(outcome, view, belief)
 
 
 def _is_good(view: View, alignment: Alignment | None) -> bool:

@@ -6,14 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from airground.config import Config
 from evaluation.setup.setups import with_localization
+from evaluation.show.figures.style import write_png
 from tests.localization.synthetic import flat_world
 from tests.negatives import worlds
-from tests.negatives.campaign import ORDER, Outcome, outcomes, table
+from tests.negatives.campaign import ORDER, Outcome, outcomes, table, tries
 from tests.negatives.flights import load, store
 from tests.negatives.kinds import NEGATIVES, PLACES
+from tests.negatives.picture import tries_figure
 from tests.negatives.views import Flown
 
 MAPS = 4
@@ -47,6 +50,15 @@ def test_rows_are_claimed_wrongly_without_the_limit_of_self_similarity(flown):
     numbers = cases("rows, moved", 2)
     assert any(one.is_wrong for one in outcomes(0, numbers, flown, free))
     assert not any(one.claimed for one in outcomes(0, numbers, flown, Config()))
+
+
+def test_the_picture_shows_both_maps_where_they_differ(flown, tmp_path):
+    (one,) = list(tries(0, cases("flat", 1), flown, Config()))[:1]
+    write_png(tries_figure([one, one]), tmp_path / "case.png")
+    picture = np.asarray(Image.open(tmp_path / "case.png").convert("RGB"))
+    height, width = picture.shape[:2]
+    assert width > height > width / 3
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 50
 
 
 def test_a_cut_map_leaves_a_tenth_of_the_surface_over_it(flown):

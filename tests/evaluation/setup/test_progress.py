@@ -40,6 +40,22 @@ def test_a_short_step_is_not_mentioned(capsys: pytest.CaptureFixture[str]) -> No
     assert capsys.readouterr().err == ""
 
 
+def test_what_was_expected_of_the_command_says_nothing_of_the_last_step() -> None:
+    with shown():
+        announce("measures 3 units", 150.0)
+        with step("starting") as starting:
+            assert starting.left_s == pytest.approx(150.0, abs=1.0)
+        with step("measuring", 3, "units") as measuring:
+            assert measuring.left_s == pytest.approx(150.0, abs=1.0)
+            measuring.advance(3)
+        with step("writing the report") as writing:
+            assert writing.left_s is None
+    with shown():
+        announce("measures 3 units", 150.0)
+        with step("starting") as starting:
+            assert starting.left_s is not None
+
+
 def test_the_time_left_comes_from_the_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 100.0
     monkeypatch.setattr("time.monotonic", lambda: now)
