@@ -141,7 +141,7 @@ def test_the_same_correlation_may_be_chance_over_a_small_overlap():
     assert refusal(625, changed(Config(), cost="ncc", sigma=0.05)) == ""
 
 
-def test_one_particle_agrees_with_nobody() -> None:
+def test_a_single_particle_agrees_with_no_other() -> None:
     config = changed(Config(), min_mode_share=0.3).localization
     cells = 2500
     sums = np.array([[cells, 0, 0, 0.01 * cells, 0.01 * cells, 0.009 * cells]], np.float64)
