@@ -214,6 +214,9 @@ class Localization(Section):
     """With `mode`: least share of the particles around the reported position."""
     converged_spread_m: Positive = 0.15
     """Largest standard deviation of these particles (with `mean`: of all) for a claim [m]."""
+    min_claimed_overlap: Fraction = 0.3
+    """Smallest overlap for a claim, as a fraction of the newest aerial map's filled cells alone,
+    also where several are laid over the ground map as one."""
     min_relief_m: Positive = 0.03
     """Least standard deviation of the heights over the overlap for a claim [m]."""
     min_correlation: Fraction = 0.4

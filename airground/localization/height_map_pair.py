@@ -33,6 +33,7 @@ class HeightMapPair:
         heading: Turn of `mav` in `ground` [rad]; not used where it is searched.
         config: The pipeline's parameters; height maps and localization are used.
         pose_errors: How well both robots' poses are known.
+        newest: The pair of the newest surface alone; None where the surface is that one.
     """
 
     stamp_ns: int
@@ -43,6 +44,7 @@ class HeightMapPair:
     heading: float | None
     config: Config
     pose_errors: PoseErrors = field(default_factory=PoseErrors.none)
+    newest: HeightMapPair | None = None
     _joined: dict[tuple[int, ...], HeightMapPair] = field(default_factory=dict, repr=False)
 
     def joined(self, earlier: Sequence[HeightMapPair]) -> HeightMapPair:
@@ -53,8 +55,12 @@ class HeightMapPair:
         stamps = tuple(pair.stamp_ns for pair in earlier)
         if stamps not in self._joined:
             points = np.concatenate([pair.points_mav for pair in (*earlier, self)])
-            self._joined[stamps] = replace(self, points_mav=points, _joined={})
+            self._joined[stamps] = replace(self, points_mav=points, newest=self, _joined={})
         return self._joined[stamps]
+
+    def newest_overlap(self, particle: F64) -> float:
+        """Share of the newest surface's filled cells over the ground map at x, y [m], heading."""
+        return float((self.newest or self).overlay(particle[None]).overlaps()[0])
 
     @property
     def searched(self) -> bool:

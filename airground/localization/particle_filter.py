@@ -137,7 +137,9 @@ class MonteCarloLocalizer:
         offset = float(overlay.height_offsets()[0])
         T_ground_mav = motion_at(estimate, pair.position_mav, offset)
         laid = make_height_map(T_ground_mav @ pair.points_mav, pair.ground.cells_per_m)
-        refusal = why_refused(overlay, agreement(laid, pair.ground), particles, self._local)
+        newest = pair.newest_overlap(estimate)
+        agreed = agreement(laid, pair.ground)
+        refusal = why_refused(overlay, newest, agreed, particles, self._local)
         return refusal or why_ambiguous(pair.aerial, laid, pair.ground, self._local)
 
 
@@ -149,7 +151,13 @@ def motion_at(estimate: F64, position_mav: F64, height_offset: float) -> SE3:
     return SE3(turned.rotation, translation)
 
 
-def why_refused(overlay: Overlays, agreed: Agreement, particles: F64, config: Localization) -> str:
+def why_refused(
+    overlay: Overlays,
+    newest_overlap: float,
+    agreed: Agreement,
+    particles: F64,
+    config: Localization,
+) -> str:
     """The reason, in one line, why no position is claimed; empty if one is.
     Its kind comes first: no overlap, no structure, particles split or heights disagree.
 
@@ -158,12 +166,18 @@ def why_refused(overlay: Overlays, agreed: Agreement, particles: F64, config: Lo
 
     Args:
         overlay, agreed: Overlap and agreement of the two maps at the estimate.
+        newest_overlap: Overlap of the newest surface alone there.
         particles: (M, 3) particles: x, y [m] and heading [rad].
         config: Section `localization` of the configuration.
     """
     overlap = float(overlay.overlaps()[0])
     if not overlap > config.min_overlap:
         return f"no overlap: only {overlap:.0%} of the aerial map lies on the ground map"
+    if newest_overlap < config.min_claimed_overlap:
+        return (
+            f"no overlap: only {newest_overlap:.0%} of the newest aerial map lies on the ground "
+            f"map, {config.min_claimed_overlap:.0%} are needed for a claim"
+        )
     relief = float(overlay.reliefs()[0])
     if relief < config.min_relief_m:
         return f"no structure: heights deviate by {1000 * relief:.0f} mm where the maps overlap"

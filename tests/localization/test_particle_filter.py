@@ -133,7 +133,8 @@ def test_the_same_correlation_may_be_chance_over_a_small_overlap():
         sums = np.array([[cells, 0, 0, 0.01 * cells, 0.01 * cells, 0.008 * cells]], np.float64)
         overlay = Overlays(sums, 0.0, 0.0, cells, cells_per_m=25.0)
         particles = np.zeros((20, 3))
-        return why_refused(overlay, Agreement(cells, 1.0, 0.0), particles, config.localization)
+        agreed = Agreement(cells, 1.0, 0.0)
+        return why_refused(overlay, 1.0, agreed, particles, config.localization)
 
     # A square metre holds 11 patches, each of which is worth half a nat.
     assert "may be chance (6 nat, 16 are enough)" in refusal(625, Config())
@@ -149,10 +150,32 @@ def test_a_single_particle_agrees_with_no_other() -> None:
 
     def refusal(*x: float) -> str:
         particles = np.array([[place, 0.0, 0.0] for place in x])
-        return why_refused(overlay, Agreement(cells, 1.0, 0.0), particles, config)
+        return why_refused(overlay, 1.0, Agreement(cells, 1.0, 0.0), particles, config)
 
     assert refusal(0.0, 2.0) == "particles split: no two of them agree on a place"
     assert refusal(0.0, 0.01) == ""
+
+
+def test_a_claim_needs_the_newest_surface_over_the_ground_map(flight) -> None:
+    """Earlier ones, laid over it as one with the newest, do not make up for it."""
+    config = changed(Config(), heading="search", headings=180)
+    robot, (points, position) = np.zeros(2), flight.maps[-1]
+    away = position + np.array([0.0, 0.0, 0.2])
+    beside = points + np.float32(40.0) * np.array([1, 0, 0], np.float32)
+    known = HeightMapPair(0, points, position, flight.ground, robot, None, config)
+    newest = HeightMapPair(1, beside, away, flight.ground, robot, None, config)
+    joined = newest.joined([known])
+    there = np.array([*PATH[-1], HEADING])
+    assert known.newest_overlap(there) > 0.9
+    assert joined.newest_overlap(there) == 0.0
+    assert 0.3 < joined.overlay(there[None]).overlaps()[0] < 0.6
+    localizer = MonteCarloLocalizer(config, np.random.default_rng(0))
+    *_, first = localizer.update(known)
+    *_, second = localizer.update(newest)
+    assert not second.belief.converged
+    assert "0% of the newest aerial map lies on the ground map, 30% are needed" in (
+        second.belief.refusal
+    ), first.belief.refusal
 
 
 def test_a_map_without_overlap_neither_kills_the_belief_nor_claims(flight):
