@@ -69,7 +69,7 @@ def test_wrong_words_get_one_line(words: list[str], message: str) -> None:
         ("sensors.gps", 1.0, "unknown dial"),
         ("localization.partciles", 5, "unknown key localization.partciles"),
         ("localizer.particles", 5, "unknown section 'localizer'"),
-        ("localization.particles", 0, "greater than or equal to 1"),
+        ("localization.particles", 1, "greater than or equal to 2"),
         ("scene.texture", 1.5, "out of its range, 0 to 1"),
         ("scene.flight_height", 0.5, "out of its range, 1.2 to 10 m"),
         ("scene.texture", "rich", "'rich' is no number"),
