@@ -48,7 +48,7 @@ def _coverage(axes: Axes, found: Localizations) -> None:
     axes.text(32, 35, "ideal", rotation=45, rotation_mode="anchor", fontsize=SMALL_PT)
     axes.set_xlabel("share of a Gaussian inside the ellipse [%]")
     axes.set_ylabel("true positions inside the ellipse [%]")
-    axes.set_title("coverage of the particles' ellipses")
+    axes.set_title("coverage of the beliefs' ellipses")
     _square(axes, 0, 100, 101.5)
 
 
