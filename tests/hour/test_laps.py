@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from sim.world.world import build_world
 from tests.hour.__main__ import failed, memory_table, pose_table
 from tests.hour.laps import BEFORE_S, CLOSED_M, Laps, fly_laps
 from tests.hour.recording import record_laps
-from tests.hour.watched import Poses, Watched
+from tests.hour.watched import STEAL_PERIOD_S, Poses, Watched, steal_clock
 from tests.sim.small_flight import SCENE, unpainted
 
 SMALL = parse_scene(SCENE, "small.toml")
@@ -109,6 +110,18 @@ def test_what_is_beyond_a_limit_is_said() -> None:
         "ground: 3 images were dropped",
     ]
     assert "| ground | 60, 97, 101 | 1 | 3 | 0.10 |" in pose_table({"ground": late})
+
+
+def test_stolen_time_is_read_while_a_command_runs() -> None:
+    began_s = time.monotonic()
+    with steal_clock() as readings:
+        time.sleep(4 * STEAL_PERIOD_S)
+    count, (at_s, stolen_ms) = len(readings), np.transpose(readings)
+    assert count >= 2
+    assert began_s < at_s[0] < at_s[-1] < time.monotonic()
+    assert (np.diff(stolen_ms) >= 0).all()
+    time.sleep(2 * STEAL_PERIOD_S)
+    assert len(readings) == count
 
 
 def test_a_short_flight_says_nothing_of_growth() -> None:

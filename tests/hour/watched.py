@@ -68,7 +68,7 @@ def watch(words: list[str], duration_s: float) -> Watched:
     said: list[str] = []
     started_s = np.inf
     with (
-        _steal_clock() as stolen,
+        steal_clock() as stolen,
         subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=ROOT
         ) as process,
@@ -93,7 +93,7 @@ def watch(words: list[str], duration_s: float) -> Watched:
 
 
 @contextmanager
-def _steal_clock() -> Iterator[list[tuple[float, float]]]:
+def steal_clock() -> Iterator[list[tuple[float, float]]]:
     """Monotonic time [s] and stolen time of all cores [ms], read while the context lasts."""
     readings: list[tuple[float, float]] = []
     ended = threading.Event()

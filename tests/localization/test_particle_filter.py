@@ -170,12 +170,11 @@ def test_a_claim_needs_the_newest_surface_over_the_ground_map(flight) -> None:
     assert joined.newest_overlap(there) == 0.0
     assert 0.3 < joined.overlay(there[None]).overlaps()[0] < 0.6
     localizer = MonteCarloLocalizer(config, np.random.default_rng(0))
-    *_, first = localizer.update(known)
-    *_, second = localizer.update(newest)
-    assert not second.belief.converged
-    assert "0% of the newest aerial map lies on the ground map, 30% are needed" in (
-        second.belief.refusal
-    ), first.belief.refusal
+    for pair in (known, newest):
+        *_, last = localizer.update(pair)
+    assert not last.belief.converged
+    said = "0% of the newest aerial map lies on the ground map, 30% are needed"
+    assert said in last.belief.refusal
 
 
 def test_a_map_without_overlap_neither_kills_the_belief_nor_claims(flight):

@@ -42,6 +42,8 @@ def main() -> int:
         words.error("--count, --heaps and --workers must be at least 1, other numbers at least 0")
     if asked.picture is not None and asked.case is None:
         words.error("--picture is of one case; give --case")
+    if asked.picture is not None and not asked.picture.parent.is_dir():
+        words.error(f"--picture: there is no folder {asked.picture.parent}")
     flown = flights(asked.heaps, asked.maps)  # made once, for all processes
     if asked.picture is not None:
         made = list(tries(asked.seed, [asked.case], flown, Config()))

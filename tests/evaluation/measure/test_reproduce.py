@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from airground.config import Config
+from evaluation.commands.options import RENDER_S_PER_S
 from evaluation.commands.reproduce import Reproduce
 from evaluation.measure.plans import reproduce as module
 from evaluation.measure.plans.reproduce import Plan, flights_over
@@ -158,6 +159,16 @@ def test_options_set_the_amount(tmp_path: Path) -> None:
     more = ("protocol.sequences_per_flight=14",)
     plan = Reproduce(out=tmp_path, sequences=500, overrides=more).plan()
     assert (plan.protocol.sequences, plan.sequences) == (14, 500)
+
+
+def test_recordings_that_are_there_are_not_expected_to_be_drawn(tmp_path: Path) -> None:
+    asked = Reproduce(out=tmp_path / "out", scenes=("tiny",), flights=2, alone=True)
+    plan, kept = asked.plan(), tmp_path / "kept"
+    both_s = asked._core_s(plan, kept)
+    (kept / recording_name(plan.flights[0])).mkdir(parents=True)
+    drawn_s = plan.flights[0].scene.duration_s * RENDER_S_PER_S
+    assert asked._core_s(plan, kept) == pytest.approx(both_s - drawn_s)
+    assert replace(asked, render=True)._core_s(plan, kept) == pytest.approx(both_s)
 
 
 def test_each_flight_over_a_heap_of_its_own() -> None:
