@@ -1,6 +1,4 @@
-"""Monte Carlo localization of the MAV in the ground robot's map (Sec. VI-B).
-
-Whether a belief may claim a position: Sec. VIII-C, and what the paper leaves open."""
+"""Monte Carlo localization of the MAV in the ground robot's map (Sec. VI-B)."""
 
 from __future__ import annotations
 
@@ -10,12 +8,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from airground.config import Config, Localization
-from airground.core.agreement import Agreement, agreement
+from airground.core.agreement import agreement
 from airground.core.arrays import F64, Floats
 from airground.core.belief import Belief
 from airground.core.events import BeliefUpdated, CostMapComputed, Event, HeightMapsMade
 from airground.core.height_map import make_height_map
 from airground.core.se3 import SE3
+from airground.localization.claim import Fit, why_refused
 from airground.localization.cost_map import Overlays
 from airground.localization.height_map_pair import HeightMapPair
 from airground.localization.hypotheses import CostVolume
@@ -137,9 +136,8 @@ class MonteCarloLocalizer:
         offset = float(overlay.height_offsets()[0])
         T_ground_mav = motion_at(estimate, pair.position_mav, offset)
         laid = make_height_map(T_ground_mav @ pair.points_mav, pair.ground.cells_per_m)
-        newest = pair.newest_overlap(estimate)
-        agreed = agreement(laid, pair.ground)
-        refusal = why_refused(overlay, newest, agreed, particles, self._local)
+        fit = Fit(overlay, pair.newest_overlap(estimate), agreement(laid, pair.ground))
+        refusal = why_refused(fit, particles, self._local)
         return refusal or why_ambiguous(pair.aerial, laid, pair.ground, self._local)
 
 
@@ -149,69 +147,3 @@ def motion_at(estimate: F64, position_mav: F64, height_offset: float) -> SE3:
     translation = np.array([*estimate[:2], 0.0]) - turned @ position_mav
     translation[2] = height_offset if np.isfinite(height_offset) else 0.0
     return SE3(turned.rotation, translation)
-
-
-def why_refused(
-    overlay: Overlays,
-    newest_overlap: float,
-    agreed: Agreement,
-    particles: F64,
-    config: Localization,
-) -> str:
-    """The reason, in one line, why no position is claimed; empty if one is.
-    Its kind comes first: no overlap, no structure, particles split or heights disagree.
-
-    The covariance says whether particles agree with each other, not whether they are right: the
-    rest asks whether the maps fit at the estimate, better than beside it.
-
-    Args:
-        overlay, agreed: Overlap and agreement of the two maps at the estimate.
-        newest_overlap: Overlap of the newest surface alone there.
-        particles: (M, 3) particles: x, y [m] and heading [rad].
-        config: Section `localization` of the configuration.
-    """
-    overlap = float(overlay.overlaps()[0])
-    if not overlap > config.min_overlap:
-        return f"no overlap: only {overlap:.0%} of the aerial map lies on the ground map"
-    if newest_overlap < config.min_claimed_overlap:
-        return (
-            f"no overlap: only {newest_overlap:.0%} of the newest aerial map lies on the ground "
-            f"map, {config.min_claimed_overlap:.0%} are needed for a claim"
-        )
-    relief = float(overlay.reliefs()[0])
-    if relief < config.min_relief_m:
-        return f"no structure: heights deviate by {1000 * relief:.0f} mm where the maps overlap"
-    refusal = _why_spread(particles, config)
-    if refusal:
-        return refusal
-    correlation = float(overlay.correlations()[0])
-    if correlation < config.min_correlation:
-        return f"heights disagree: at the estimate they correlate by {correlation:.2f} only"
-    evidence = -float(overlay.costs(config)[0])
-    if config.cost == "likelihood" and evidence < config.min_evidence:
-        return (
-            f"heights disagree: that they correlate by {correlation:.2f} over {overlap:.0%} of the "
-            f"aerial map may be chance ({evidence:.0f} nat, {config.min_evidence:g} are enough)"
-        )
-    if agreed.kappa < config.min_agreement:
-        return (
-            f"heights disagree: they agree over {agreed.share:.0%} at the estimate, "
-            f"and over {agreed.chance:.0%} beside it, which may be chance"
-        )
-    return ""
-
-
-def _why_spread(particles: F64, config: Localization) -> str:
-    """Refuses particles that are spread; with `mode`, a minority elsewhere is allowed."""
-    counted = particles
-    if config.estimate == "mode":
-        mode = densest_mode(particles)
-        if mode.mean() < config.min_mode_share:
-            return f"particles split: only {mode.mean():.0%} of them agree on a place"
-        counted = particles[mode]
-    if len(counted) < 2:
-        return "particles split: no two of them agree on a place"
-    spread_m = float(np.sqrt(np.trace(np.cov(counted[:, :2].T))))
-    if spread_m > config.converged_spread_m:
-        return f"particles split: they are still spread over {spread_m:.2f} m"
-    return ""

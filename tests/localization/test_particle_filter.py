@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 
 from airground.config import Config, paper, paper_literal
-from airground.core.agreement import Agreement
 from airground.core.events import BeliefUpdated, CostMapComputed, HeightMapsMade
 from airground.core.se3 import SE3
-from airground.localization.cost_map import Overlays
 from airground.localization.height_map_pair import HeightMapPair
-from airground.localization.particle_filter import MonteCarloLocalizer, why_refused
+from airground.localization.particle_filter import MonteCarloLocalizer
 from tests.localization.synthetic import aerial_points, box_heap, flat_world, ground_points
 
 HEADING = 2.0
@@ -124,36 +122,6 @@ def test_another_heaps_map_is_refused(lost_flight, cost_sigma):
     for belief in beliefs(lost_flight.localize(config)):
         assert not belief.converged
         assert belief.refusal
-
-
-def test_the_same_correlation_may_be_chance_over_a_small_overlap():
-    """Heights that deviate by 0.1 m and correlate by 0.8, where the maps agree perfectly."""
-
-    def refusal(cells, config):
-        sums = np.array([[cells, 0, 0, 0.01 * cells, 0.01 * cells, 0.008 * cells]], np.float64)
-        overlay = Overlays(sums, 0.0, 0.0, cells, cells_per_m=25.0)
-        particles = np.zeros((20, 3))
-        agreed = Agreement(cells, 1.0, 0.0)
-        return why_refused(overlay, 1.0, agreed, particles, config.localization)
-
-    # A square metre holds 11 patches, each of which is worth half a nat.
-    assert "may be chance (6 nat, 16 are enough)" in refusal(625, Config())
-    assert refusal(4 * 625, Config()) == ""
-    assert refusal(625, changed(Config(), cost="ncc", sigma=0.05)) == ""
-
-
-def test_a_single_particle_agrees_with_no_other() -> None:
-    config = changed(Config(), min_mode_share=0.3).localization
-    cells = 2500
-    sums = np.array([[cells, 0, 0, 0.01 * cells, 0.01 * cells, 0.009 * cells]], np.float64)
-    overlay = Overlays(sums, 0.0, 0.0, cells, cells_per_m=25.0)
-
-    def refusal(*x: float) -> str:
-        particles = np.array([[place, 0.0, 0.0] for place in x])
-        return why_refused(overlay, 1.0, Agreement(cells, 1.0, 0.0), particles, config)
-
-    assert refusal(0.0, 2.0) == "particles split: no two of them agree on a place"
-    assert refusal(0.0, 0.01) == ""
 
 
 def test_a_claim_needs_the_newest_surface_over_the_ground_map(flight) -> None:

@@ -1,0 +1,57 @@
+"""When a position is claimed, from sums of two maps at one hypothesis."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from airground.config import Config, Localization
+from airground.core.agreement import Agreement
+from airground.localization.claim import Fit, why_refused
+from airground.localization.cost_map import Overlays
+
+TOGETHER = np.zeros((20, 3))
+BEST = Config().localization
+
+
+def fit(correlation: float, cells: int = 2500) -> Fit:
+    """Heights that deviate by 0.1 m over cells of 4 cm, in maps that overlap and agree wholly."""
+    sums = np.array([[cells, 0, 0, 0.01 * cells, 0.01 * cells, correlation * 0.01 * cells]])
+    overlay = Overlays(sums, 0.0, 0.0, cells, cells_per_m=25.0)
+    return Fit(overlay, 1.0, Agreement(cells, 1.0, 0.0))
+
+
+def changed(**changes: object) -> Localization:
+    return BEST.model_copy(update=changes)
+
+
+def test_the_same_correlation_may_be_chance_over_a_small_overlap() -> None:
+    # A square metre holds 11 patches, each of which is worth half a nat.
+    small, large = fit(0.8, cells=625), fit(0.8, cells=4 * 625)
+    assert "may be chance (6 nat, 16 are enough)" in why_refused(small, TOGETHER, BEST)
+    assert why_refused(large, TOGETHER, BEST) == ""
+    assert why_refused(small, TOGETHER, changed(cost="ncc", sigma=0.05)) == ""
+
+
+def test_a_single_particle_agrees_with_no_other() -> None:
+    def refusal(*x: float) -> str:
+        particles = np.array([[place, 0.0, 0.0] for place in x])
+        return why_refused(fit(0.9), particles, changed(min_mode_share=0.3))
+
+    assert refusal(0.0, 2.0) == "particles split: no two of them agree on a place"
+    assert refusal(0.0, 0.01) == ""
+
+
+def test_each_thing_that_a_claim_needs_has_its_reason() -> None:
+    good = fit(0.9)
+    assert why_refused(good, TOGETHER, BEST) == ""
+    beside = replace(good, overlay=replace(good.overlay, aerial_cells=25000))
+    assert why_refused(beside, TOGETHER, BEST).startswith("no overlap: only 10% of the aerial map")
+    newest = replace(good, newest_overlap=0.2)
+    assert why_refused(newest, TOGETHER, BEST).startswith("no overlap: only 20% of the newest")
+    flat = replace(good, overlay=replace(good.overlay, sums=good.overlay.sums * [1, 1, 1, 0, 0, 0]))
+    assert why_refused(flat, TOGETHER, BEST).startswith("no structure: ")
+    spread = np.column_stack([np.linspace(0, 2, 20), np.zeros((20, 2))])
+    assert why_refused(good, spread, BEST).startswith("particles split: ")
+    assert why_refused(fit(0.1), TOGETHER, BEST).startswith("heights disagree: ")
+    elsewhere = replace(good, agreed=Agreement(2500, 0.9, 0.9))
+    assert "over 90% beside it" in why_refused(elsewhere, TOGETHER, BEST)
