@@ -46,8 +46,8 @@ def why_refused(fit: Fit, particles: F64, config: Localization) -> str:
         return f"no overlap: only {overlap:.0%} of the aerial map lies on the ground map"
     if fit.newest_overlap < config.min_claimed_overlap:
         return (
-            f"no overlap: only {fit.newest_overlap:.0%} of the newest aerial map lies on the ground "
-            f"map, {config.min_claimed_overlap:.0%} are needed for a claim"
+            f"no overlap: only {fit.newest_overlap:.0%} of the newest aerial map lies on the "
+            f"ground map, {config.min_claimed_overlap:.0%} are needed for a claim"
         )
     relief = float(overlay.reliefs()[0])
     if relief < config.min_relief_m:

@@ -12,6 +12,10 @@ from airground.core.arrays import C64, F32, F64, FAST, Floats
 
 COUNT, SUM_A, SUM_G, SUM_AA, SUM_GG, SUM_AG = range(6)
 
+VECTOR_CELLS = 32
+"""Cells that a processor sums at a time. What is left of a row takes as long as a multiple of it.
+So rows end in empty cells."""
+
 MAX_CORRELATION = 0.999
 """No two robots' heights correlate more; the same heights have an infinite likelihood."""
 
@@ -30,13 +34,13 @@ def mean_height(heights: F32) -> tuple[float, int]:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def about_mean(heights: F32, margin: int) -> tuple[F32, F32, float]:
+def about_mean(heights: F32, margin: int, after: int) -> tuple[F32, F32, float]:
     """Heights (nx, ny) [m] with NaN in holes as heights about their mean, 0 in holes; mask; mean.
-    The first two have an empty border, `margin` cells wide."""
+    The first two have an empty border, `margin` cells wide, and `after` more empty columns."""
     nx, ny = heights.shape
     mean, _ = mean_height(heights)
-    centred = np.zeros((nx + 2 * margin, ny + 2 * margin), np.float32)
-    mask = np.zeros((nx + 2 * margin, ny + 2 * margin), np.float32)
+    centred = np.zeros((nx + 2 * margin, ny + 2 * margin + after), np.float32)
+    mask = np.zeros((nx + 2 * margin, ny + 2 * margin + after), np.float32)
     middle, zero, one = np.float32(mean), np.float32(0), np.float32(1)
     for i in range(nx):
         row = heights[i]
@@ -146,7 +150,7 @@ def sums_at_positions(
     at least half of the weight; a whole shift counts the same cells as the cost map.
 
     Args:
-        aerial, ground: Heights [m] with 0 in holes.
+        aerial, ground: Heights [m] with 0 in holes. The last `VECTOR_CELLS` columns are empty.
         aerial_mask, ground_mask: 1 where filled, 0 in holes.
         shifts: (M, 2) index in `ground` of the aerial cell [0, 0] [cells].
     """
@@ -159,9 +163,10 @@ def sums_at_positions(
         row_first = max(0, -ix)
         rows = min(aerial.shape[0], ground.shape[0] - 1 - ix) - row_first
         first = max(0, -iy)
-        length = min(aerial.shape[1], ground.shape[1] - 1 - iy) - first
+        length = min(aerial.shape[1], ground.shape[1] - 1 - iy) - VECTOR_CELLS - first
         if rows <= 0 or length <= 0:
             continue
+        length = -(-length // VECTOR_CELLS) * VECTOR_CELLS
         for row in range(rows):
             i, j = row_first + row, row_first + row + ix
             low, high = first + iy, first + iy + length + 1

@@ -19,6 +19,7 @@ from airground.localization.cost_kernels import (
     SUM_AG,
     SUM_G,
     SUM_GG,
+    VECTOR_CELLS,
     about_mean,
     difference_spectrum,
     log_likelihood_ratio,
@@ -41,9 +42,10 @@ class Masked:
     mean: float
 
 
-def masked(heights: F32, margin: int = 0) -> Masked:
-    """Split heights with NaN into values and mask, with `margin` empty cells around."""
-    return Masked(*about_mean(heights, margin))
+def masked(heights: F32, margin: int = 0, after: int = 0) -> Masked:
+    """Split heights with NaN into values and mask, with `margin` empty cells around, and `after`
+    more empty columns."""
+    return Masked(*about_mean(heights, margin, after))
 
 
 def costs_of(sums: Floats, aerial_cells: int, cells_per_m: float, config: Localization) -> F32:
@@ -245,7 +247,8 @@ def overlay_at(aerial: HeightMap, ground: HeightMap, positions: F64) -> Overlays
     """Lay the aerial map at M positions u (M, 2) [m] over the ground map, bilinearly."""
     places = np.asarray(positions, np.float64) * ground.cells_per_m
     heights, first = _within_reach(ground, places, reach_of(aerial))
-    a, g = masked(aerial.heights), masked(heights, margin=1)
+    a = masked(aerial.heights, after=VECTOR_CELLS)
+    g = masked(heights, margin=1, after=VECTOR_CELLS)
     shifts = places + (lattice_index(aerial) - first + 1)
     sums = sums_at_positions(a.heights, a.mask, g.heights, g.mask, shifts)
     return Overlays(sums, a.mean, g.mean, aerial.filled_cells, ground.cells_per_m)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from airground.config import Config, Localization
+from airground.config import Config
 from airground.core.agreement import agreement
 from airground.core.arrays import F64, Floats
 from airground.core.belief import Belief

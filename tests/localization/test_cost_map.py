@@ -214,6 +214,9 @@ def test_heights_about_their_mean_are_those_of_arrays() -> None:
     assert np.array_equal(split.heights, np.pad(centred, 2))
     assert np.array_equal(split.mask, np.pad(filled, 2))
     assert split.heights.dtype == split.mask.dtype == np.float32
+    longer = masked(heights, margin=2, after=3)
+    assert np.array_equal(longer.heights, np.pad(split.heights, ((0, 0), (0, 3))))
+    assert np.array_equal(longer.mask, np.pad(split.mask, ((0, 0), (0, 3))))
     empty = masked(np.full((3, 4), np.nan, np.float32))
     assert empty.mean == 0
     assert not empty.heights.any()
