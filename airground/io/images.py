@@ -20,6 +20,8 @@ from airground.errors import RecordingError
 from airground.io.input_files import IMAGE_LIMIT, read_bytes
 from airground.io.png import SIGNATURE, PngHeader, decode_png, warm_up_decoding
 
+PIXEL_LIMIT = 1 << 26
+"""Pixels of an image; a file of some megabytes can claim thousands of millions."""
 _PNG_END = b"IEND\xaeB`\x82"
 _JPEG_START = b"\xff\xd8\xff"
 
@@ -98,7 +100,10 @@ def size_of(data: bytes) -> tuple[int, int]:
 
 def decode(data: bytes) -> NDArray[Any]:
     """A PNG or JPEG image: grey (H, W), or colour (H, W, C) with RGB first.
-    ValueError if it is damaged. The caller has compared `size_of` with what it expects."""
+    ValueError if it is damaged or larger than `PIXEL_LIMIT`."""
+    width, height = size_of(data)
+    if width * height > PIXEL_LIMIT:
+        raise ValueError(f"{width}x{height} are more than {PIXEL_LIMIT} pixels")
     if data.startswith(_JPEG_START):
         return _decode_jpeg(data)
     if not data.endswith(_PNG_END):

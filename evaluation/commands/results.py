@@ -103,8 +103,14 @@ class Check(Verb):
 
         self._check_level()
         before = self._reference()
-        after = Measured.of(read_table(self.results), before.condition)
-        comparison = compare(before, after)
+        try:
+            after = Measured.of(read_table(self.results), before.condition)
+            comparison = compare(before, after)
+        except InputError as error:
+            if self.against != ACCEPTED:
+                raise
+            hint = "these are the accepted results of the suite; --against names others"
+            raise InputError(f"{error} ({hint})") from None
         verdict_table.print_comparison(comparison)
         if self.against.is_dir():
             from evaluation.show.rerun_view.differences import hold_folders, print_worsened

@@ -8,6 +8,7 @@
 | 3 | `doctor` or `inspect` found something wrong in what was looked at |
 | 70 | internal error: a defect of this program; one line names the log file to report |
 | 130 | interrupted by Ctrl-C or terminated |
+| 141 | whoever read the output closed it before the command had finished |
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import contextlib
 import errno
 import logging
 import os
+import select
 import signal
 import sys
 import tempfile
@@ -23,6 +25,7 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
+from typing import TextIO
 
 from airground import __version__
 from airground.errors import AirgroundError, InputError
@@ -38,6 +41,8 @@ LONGEST_MESSAGE = 800
 """Characters of a message: some lines of a screen."""
 EXIT_INTERRUPTED = 130
 """128 + SIGINT, as shells give it."""
+EXIT_UNREAD = 141
+"""128 + SIGPIPE."""
 
 
 class Terminated(KeyboardInterrupt):
@@ -74,15 +79,16 @@ def run(command: Callable[[], int | None], verbose: bool = False) -> int:
     """
     before = signal.signal(signal.SIGTERM, _terminate)
     try:
-        code = command() or EXIT_OK
-        sys.stdout.flush()  # here, where a closed pipe is met
-        return code
+        return _written(command() or EXIT_OK)
     except AirgroundError as error:
         print_error(str(error))
         return EXIT_ERROR
-    except BrokenPipeError:  # the reader of stdout has seen enough
+    except BrokenPipeError as error:
+        if not _unread(sys.stdout):  # some other pipe, as that of a process that died
+            _report(error, verbose)
+            return EXIT_INTERNAL
         _discard_stdout()
-        return EXIT_OK
+        return EXIT_UNREAD
     except MemoryError:
         print_error("out of memory; a shorter recording or fewer --threads need less")
         return EXIT_ERROR
@@ -99,6 +105,28 @@ def run(command: Callable[[], int | None], verbose: bool = False) -> int:
         return EXIT_INTERNAL
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+def _written(code: int) -> int:
+    """The exit code of a finished command, whose last output may find no reader any more."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _discard_stdout()
+    except OSError:
+        _discard_stdout()
+        raise
+    return code
+
+
+def _unread(stream: TextIO) -> bool:
+    """Whether the stream is a pipe that nothing reads any more."""
+    poll = select.poll()
+    try:
+        poll.register(stream.fileno(), 0)
+    except (OSError, ValueError):
+        return False
+    return any(event & select.POLLERR for _, event in poll.poll(0))
 
 
 def _interrupted(interrupt: KeyboardInterrupt) -> int:

@@ -176,6 +176,11 @@ def test_an_existing_folder_is_left_alone(
     assert (tmp_path / "mine").read_text() == "precious"
 
 
+def buffered() -> dict[str, str]:
+    """This environment; output to a pipe is written when the command has ended."""
+    return {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+
+
 class TestRun:
     """What becomes of a verb's errors."""
 
@@ -267,13 +272,51 @@ class TestRun:
     def test_a_reader_that_has_seen_enough_is_no_error(self) -> None:
         script = f"import sys; sys.argv[1:] = ['--help']; {RUN_CLI}"
         with subprocess.Popen(
-            [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+            [sys.executable, "-c", script],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=buffered(),
         ) as process:
             assert process.stdout is not None
             process.stdout.close()
             assert process.wait() == console.EXIT_OK
             assert process.stderr is not None
             assert process.stderr.read() == b""
+
+    @pytest.mark.parametrize(
+        ("command", "expected"),
+        [
+            ("lambda: print('worse') or 1", 1),
+            ("lambda: print('x' * 100_000) or print('y', flush=True) or 1", console.EXIT_UNREAD),
+        ],
+        ids=["finished", "cut off"],
+    )
+    def test_a_verdict_does_not_get_lost_with_its_reader(self, command: str, expected: int) -> None:
+        script = (
+            "import sys; from evaluation.setup import console; sys.stdin.read(); "
+            f"sys.exit(console.run({command}))"
+        )
+        with subprocess.Popen(
+            [sys.executable, "-c", script],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=buffered(),
+        ) as process:
+            assert process.stdout is not None
+            process.stdout.close()
+            assert process.stdin is not None
+            process.stdin.close()
+            assert process.wait() == expected
+
+    def test_the_pipe_of_another_process_is_no_reader(
+        self, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        def command() -> None:
+            raise BrokenPipeError
+
+        assert console.run(command) == console.EXIT_INTERNAL
+        assert "internal error" in capsys.readouterr().err
 
     def test_the_verbs_exit_code_is_kept(self) -> None:
         assert console.run(lambda: 1) == 1

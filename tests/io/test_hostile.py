@@ -8,15 +8,18 @@ import zlib
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+import open3d as o3d
 import pytest
 
 from airground.core.cloud import Source
 from airground.errors import AirgroundError
-from airground.io.images import read_depth, read_grey
+from airground.io.images import decode, read_depth, read_grey
 from airground.io.open_recording import open_robot
 from airground.io.ply import read_ply
 from airground.io.recording import Recording
-from airground.io.sensor_file import read_mapping
+from airground.io.sensor_file import read_imu_noise, read_mapping
+from sim.recording.true_surface import TrueSurface
 from tests.io.plain_folders import write_euroc, write_tum
 from tests.io.recordings import write_recording
 
@@ -127,6 +130,44 @@ def test_yaml_that_is_more_than_numbers(tmp_path: Path, what: str) -> None:
     file = tmp_path / "sensor.yaml"
     file.write_text(text)
     refused(lambda: read_mapping(file), pattern)
+
+
+def test_a_number_beyond_all_floats(tmp_path: Path) -> None:
+    file = tmp_path / "imu.yaml"
+    file.write_text(f"gyroscope_noise_density: {'9' * 400}")
+    refused(lambda: read_imu_noise(file), "expected a positive number, got 999")
+
+
+def test_an_image_of_more_pixels_than_any_camera_has() -> None:
+    header = b"".join(n.to_bytes(4, "big") for n in (30_000, 30_000)) + bytes([16, 0, 0, 0, 0])
+    chunk = b"IHDR" + header
+    end = b"\0\0\0\0IEND\xaeB`\x82"
+    size, check = len(header).to_bytes(4, "big"), zlib.crc32(chunk).to_bytes(4, "big")
+    with pytest.raises(ValueError, match="30000x30000 are more than 67108864 pixels"):
+        decode(b"\x89PNG\r\n\x1a\n" + size + chunk + check + end)
+
+
+@pytest.mark.parametrize(
+    ("vertex", "index", "pattern"),
+    [
+        (0.0, 2, None),
+        (np.nan, 2, "a vertex is not finite"),
+        (0.0, 3, "a triangle has a vertex that is not there"),
+    ],
+)
+def test_a_true_mesh_without_meaning(
+    tmp_path: Path, vertex: float, index: int, pattern: str | None
+) -> None:
+    file = tmp_path / "surface.ply"
+    vertices = o3d.utility.Vector3dVector(np.array([[0, 0, vertex], [1, 0, 0], [0, 1, 0]]))
+    triangles = o3d.utility.Vector3iVector(np.array([[0, 1, index]]))
+    mesh = o3d.geometry.TriangleMesh(vertices, triangles)
+    assert o3d.io.write_triangle_mesh(str(file), mesh)
+    surface = TrueSurface(file, tmp_path / "parts.csv")
+    if pattern is None:
+        assert len(surface.mesh.triangles) == 1
+    else:
+        refused(lambda: surface.mesh, pattern)
 
 
 def test_toml_that_is_nested_too_deep(tmp_path: Path) -> None:

@@ -149,21 +149,27 @@ class Crew:
 def _joined(where: str, stack: ExitStack) -> Client:
     """A client of a running cluster, or of one that a batch system starts."""
     if where.endswith((".yaml", ".yml")):
-        return Client(stack.enter_context(batch_cluster(Path(where))), set_as_default=False)
+        cluster = stack.enter_context(batch_cluster(Path(where)))
+        _warn_unless_encrypted(where, cluster.scheduler_address)
+        return Client(cluster, set_as_default=False)
     if "://" not in where:
         raise InputError(
             f"--cluster {where}: expected tls://HOST:PORT, tcp://HOST:PORT or a .yaml file"
         )
-    if where.startswith("tcp://"):
+    _warn_unless_encrypted(where, where)
+    try:
+        return Client(where, timeout=CONNECT_S, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(f"--cluster {where}: no Dask scheduler answers there ({error})") from None
+
+
+def _warn_unless_encrypted(where: str, address: str) -> None:
+    if not address.startswith("tls://"):
         logger.warning(
             "--cluster %s: not encrypted; whoever reaches a port of this cluster runs code as you "
             "(docs/sweep.md has tls://)",
             where,
         )
-    try:
-        return Client(where, timeout=CONNECT_S, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
-        raise InputError(f"--cluster {where}: no Dask scheduler answers there ({error})") from None
 
 
 def _check(client: Client, where: str) -> None:

@@ -198,6 +198,15 @@ def test_what_cannot_be_compared_is_one_line(
         assert complaint in one_error_line(capsys)
 
 
+def test_results_of_other_flights_hint_at_what_is_asked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    few = write(make_results(range(3)), tmp_path / "few")
+    capsys.readouterr()
+    assert exit_code("check", few) == console.EXIT_ERROR
+    assert "--against names others" in one_error_line(capsys)
+
+
 def test_accepting_without_a_reason_changes_nothing(
     accepted: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

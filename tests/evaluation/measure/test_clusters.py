@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -128,6 +129,18 @@ def test_an_invalid_file_is_an_error(old: str, new: str, message: str, tmp_path:
     file.write_text(SLURM.replace(old, new, 1))
     with pytest.raises(InputError, match=message):
         batch_cluster(file)
+
+
+def test_jobs_without_encryption_are_named(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def started(_file: Path) -> LocalCluster:
+        return LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0")
+
+    monkeypatch.setattr("evaluation.measure.work.crew.batch_cluster", started)
+    with caplog.at_level(logging.WARNING):
+        assert squares(str(tmp_path / "slurm.yaml"), tmp_path) == [(0, 1), (1, 4), (2, 9)]
+    assert "runs code as you" in caplog.text
 
 
 @pytest.mark.slow
