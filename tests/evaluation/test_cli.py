@@ -176,9 +176,23 @@ def test_an_existing_folder_is_left_alone(
     assert (tmp_path / "mine").read_text() == "precious"
 
 
-def buffered() -> dict[str, str]:
-    """This environment; output to a pipe is written when the command has ended."""
-    return {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+def without_reader(script: str) -> tuple[int, bytes]:
+    """Exit code and errors of a Python script whose standard output has no reader. It starts to
+    write when its standard input ends, or sooner; what it writes is kept until it ends."""
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    with subprocess.Popen(
+        [sys.executable, "-c", script],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=buffered,
+    ) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        process.stdin.close()
+        return process.wait(), process.stderr.read()
 
 
 class TestRun:
@@ -271,17 +285,7 @@ class TestRun:
 
     def test_a_reader_that_has_seen_enough_is_no_error(self) -> None:
         script = f"import sys; sys.argv[1:] = ['--help']; {RUN_CLI}"
-        with subprocess.Popen(
-            [sys.executable, "-c", script],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env=buffered(),
-        ) as process:
-            assert process.stdout is not None
-            process.stdout.close()
-            assert process.wait() == console.EXIT_OK
-            assert process.stderr is not None
-            assert process.stderr.read() == b""
+        assert without_reader(script) == (console.EXIT_OK, b"")
 
     @pytest.mark.parametrize(
         ("command", "expected"),
@@ -296,18 +300,7 @@ class TestRun:
             "import sys; from evaluation.setup import console; sys.stdin.read(); "
             f"sys.exit(console.run({command}))"
         )
-        with subprocess.Popen(
-            [sys.executable, "-c", script],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env=buffered(),
-        ) as process:
-            assert process.stdout is not None
-            process.stdout.close()
-            assert process.stdin is not None
-            process.stdin.close()
-            assert process.wait() == expected
+        assert without_reader(script) == (expected, b"")
 
     def test_the_pipe_of_another_process_is_no_reader(
         self, capsys: pytest.CaptureFixture[str]

@@ -99,10 +99,12 @@ def test_a_particle_alone_costs_what_it_costs_among_others(turned):
     np.testing.assert_allclose(together.costs(config("ncc")), costs, atol=1e-4)
 
 
+@pytest.mark.parametrize("width", [16, 32, 33, 70])  # rows are summed by 32 cells
 @pytest.mark.parametrize("cost", ["zmssd", "ncc", "likelihood"])
-def test_a_particle_on_the_lattice_costs_what_the_map_says(cost):
+def test_a_particle_on_the_lattice_costs_what_the_map_says(cost, width):
     rng = np.random.default_rng(6)
-    aerial, ground = random_map(rng, (20, 16), (-9, -7)), random_map(rng, (40, 40), (-20, -20))
+    aerial = random_map(rng, (20, width), (-9, -width // 2 + 1))
+    ground = random_map(rng, (40, width + 24), (-20, -width // 2 - 12))
     setting = config(cost)
     whole = compute_cost_map(aerial, ground, (0.0, 0.0), 0.0, setting)
     cells = np.array(list(np.ndindex(*whole.costs.shape)))
