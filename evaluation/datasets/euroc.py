@@ -83,12 +83,15 @@ def _write_states(path: Path, simulated: Simulated) -> None:
 
 def _biases(simulated: Simulated) -> NDArray[np.float64]:
     """(N, 6) biases of gyro [rad/s] and accelerometer [m/s^2] from the truth: recordings hold none.
-    White noise remains with its density over sqrt(2 sqrt(pi) BIAS_WINDOW_S)."""
+    White noise remains with its density over sqrt(2 sqrt(pi) BIAS_WINDOW_S). Where samples are
+    missing, biases are interpolated."""
     samples, _ = simulated.samples("mav")
-    motion = simulated.motion("mav")
+    motion, stamps_ns = simulated.motion("mav"), simulated.truth.motion.stamps_ns
     measured = np.hstack([samples.gyro, samples.accelerometer])
-    errors = measured - np.hstack([motion.gyro_imu, motion.specific_force_imu])
-    return gaussian_filter1d(errors, BIAS_WINDOW_S * RATE_HZ, axis=0, mode="nearest")
+    true = np.hstack([motion.gyro_imu, motion.specific_force_imu])
+    errors = measured - true[np.searchsorted(stamps_ns, samples.stamps_ns)]
+    smooth = gaussian_filter1d(errors, BIAS_WINDOW_S * RATE_HZ, axis=0, mode="nearest")
+    return np.column_stack([np.interp(stamps_ns, samples.stamps_ns, bias) for bias in smooth.T])
 
 
 def _write_yaml(path: Path, text: str) -> None:

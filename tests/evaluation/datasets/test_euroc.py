@@ -12,8 +12,16 @@ from scipy.spatial.transform import Rotation
 
 from airground.io.euroc import read_imu
 from airground.io.sensor_file import read_mapping
+from evaluation.datasets.formats import FORMATS
 from evaluation.datasets.simulated import Simulated
 from evaluation.table.true_camera import read_euroc_poses
+from sim.recording import recorder
+from sim.recording.recorder import record
+from sim.scene import parse_scene
+from sim.sensors.presets import NOMINAL
+from sim.sensors.turned import with_imu_gap
+from tests.evaluation.conftest import images_in_flight
+from tests.sim.small_flight import SCENE
 
 OFFICIAL = {
     "body.yaml",
@@ -128,3 +136,22 @@ def test_the_surface_is_the_true_one(mav0: Path, simulated: Simulated) -> None:
     distances = simulated.truth.surface("mav").distance(np.asarray(cloud.points))
     assert len(distances) == 200_000
     assert distances.max() < 1e-5
+
+
+def test_an_imu_that_was_silent_leaves_the_truth_whole(
+    simulated: Simulated, states: np.ndarray, tmp_path: Path
+) -> None:
+    """The same flight with 0.3 s without samples: states at all times, biases as beside the gap."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(recorder, "image_stamps", images_in_flight)
+        scene = parse_scene(SCENE, "small.toml")
+        path = record(scene, 3, with_imu_gap(NOMINAL, 0.3), tmp_path / "silent", workers=1)
+    silent = Simulated.open(path)
+    samples, _ = silent.samples("mav")
+    assert len(simulated.truth.motion.stamps_ns) - len(samples.stamps_ns) == 60
+    FORMATS["euroc"].write(tmp_path / "euroc", silent, ("mav",))
+    folder = tmp_path / "euroc" / "mav0"
+    written = np.loadtxt(folder / "state_groundtruth_estimate0" / "data.csv", delimiter=",")
+    np.testing.assert_array_equal(written[:, :11], states[:, :11])
+    assert np.abs(written[:, 11:] - states[:, 11:]).max() < 0.1
+    assert len(read_imu(folder / "imu0" / "data.csv").stamps_ns) == len(samples.stamps_ns)
