@@ -227,7 +227,7 @@ class Localization(Section):
     by chance; 7 more make that a matter of one in a thousand."""
     min_agreement: Fraction = 0.2
     """Least agreement of the heights beyond chance for a claim (Cohen's kappa,
-    core/agreement.py)."""
+    core/agreement.py), also of the newest aerial map's alone where several are laid as one."""
     max_self_similarity: Fraction = 0.8
     """Largest correlation of the aerial map with itself, and of the ground map with itself, shifted
     to another place, for a claim."""

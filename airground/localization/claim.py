@@ -19,13 +19,15 @@ class Fit:
 
     Attributes:
         overlay: Overlap of the aerial map, which may be several surfaces as one, at one hypothesis.
-        newest_overlap: Share of the newest surface alone that lies over the ground map there.
         agreed: Agreement of the heights there, and beside it.
+        newest_overlap: Share of the newest surface alone that lies over the ground map there.
+        newest_agreed: Agreement of its heights.
     """
 
     overlay: Overlays
-    newest_overlap: float
     agreed: Agreement
+    newest_overlap: float
+    newest_agreed: Agreement
 
 
 def why_refused(fit: Fit, particles: F64, config: Localization) -> str:
@@ -40,7 +42,7 @@ def why_refused(fit: Fit, particles: F64, config: Localization) -> str:
         particles: (M, 3) particles: x, y [m] and heading [rad].
         config: Section `localization` of the configuration.
     """
-    overlay, agreed = fit.overlay, fit.agreed
+    overlay = fit.overlay
     overlap = float(overlay.overlaps()[0])
     if not overlap > config.min_overlap:
         return f"no overlap: only {overlap:.0%} of the aerial map lies on the ground map"
@@ -64,11 +66,13 @@ def why_refused(fit: Fit, particles: F64, config: Localization) -> str:
             f"heights disagree: that they correlate by {correlation:.2f} over {overlap:.0%} of the "
             f"aerial map may be chance ({evidence:.0f} nat, {config.min_evidence:g} are enough)"
         )
-    if agreed.kappa < config.min_agreement:
-        return (
-            f"heights disagree: they agree over {agreed.share:.0%} at the estimate, "
-            f"and over {agreed.chance:.0%} beside it, which may be chance"
-        )
+    # Several surfaces as one can agree by chance while the newest lies among other boxes.
+    for those, agreed in (("they", fit.agreed), ("the newest", fit.newest_agreed)):
+        if agreed.kappa < config.min_agreement:
+            return (
+                f"heights disagree: {those} agree over {agreed.share:.0%} at the estimate, "
+                f"and over {agreed.chance:.0%} beside it, which may be chance"
+            )
     return ""
 
 

@@ -135,8 +135,13 @@ class MonteCarloLocalizer:
     ) -> str:
         offset = float(overlay.height_offsets()[0])
         T_ground_mav = motion_at(estimate, pair.position_mav, offset)
-        laid = make_height_map(T_ground_mav @ pair.points_mav, pair.ground.cells_per_m)
-        fit = Fit(overlay, pair.newest_overlap(estimate), agreement(laid, pair.ground))
+        cells_per_m = pair.ground.cells_per_m
+        laid = make_height_map(T_ground_mav @ pair.points_mav, cells_per_m)
+        agreed = newest_agreed = agreement(laid, pair.ground)
+        if pair.newest is not None:
+            newest = make_height_map(T_ground_mav @ pair.newest.points_mav, cells_per_m)
+            newest_agreed = agreement(newest, pair.ground)
+        fit = Fit(overlay, agreed, pair.newest_overlap(estimate), newest_agreed)
         refusal = why_refused(fit, particles, self._local)
         return refusal or why_ambiguous(pair.aerial, laid, pair.ground, self._local)
 

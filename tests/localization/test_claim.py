@@ -17,7 +17,8 @@ def fit(correlation: float, cells: int = 2500) -> Fit:
     """Heights that deviate by 0.1 m over cells of 4 cm, in maps that overlap and agree wholly."""
     sums = np.array([[cells, 0, 0, 0.01 * cells, 0.01 * cells, correlation * 0.01 * cells]])
     overlay = Overlays(sums, 0.0, 0.0, cells, cells_per_m=25.0)
-    return Fit(overlay, 1.0, Agreement(cells, 1.0, 0.0))
+    agreed = Agreement(cells, 1.0, 0.0)
+    return Fit(overlay, agreed, 1.0, agreed)
 
 
 def changed(**changes: object) -> Localization:
@@ -54,4 +55,6 @@ def test_each_thing_that_a_claim_needs_has_its_reason() -> None:
     assert why_refused(good, spread, BEST).startswith("particles split: ")
     assert why_refused(fit(0.1), TOGETHER, BEST).startswith("heights disagree: ")
     elsewhere = replace(good, agreed=Agreement(2500, 0.9, 0.9))
-    assert "over 90% beside it" in why_refused(elsewhere, TOGETHER, BEST)
+    assert "they agree over 90% at" in why_refused(elsewhere, TOGETHER, BEST)
+    alone = replace(good, newest_agreed=Agreement(1000, 0.8, 0.79))
+    assert "the newest agree over 80% at" in why_refused(alone, TOGETHER, BEST)

@@ -12,6 +12,8 @@ from tests.localization.synthetic import aerial_points, box_heap, flat_world, gr
 
 HEADING = 2.0
 T_MAV_WORLD = SE3.from_heading(-HEADING, (1.0, 2.0, 0.3))
+ROBOT = np.array([0.3, 0.0])
+MIRROR = np.array([-1, 1, 1], np.float32)
 PATH = [(-0.6, 0.2), (-0.2, 0.3), (0.2, 0.3), (0.6, 0.2)]
 
 
@@ -30,8 +32,7 @@ class Flight:
         localizer = MonteCarloLocalizer(config, np.random.default_rng(seed))
         events = []
         for stamp, (points, position) in enumerate(self.maps):
-            robot = np.array([0.3, 0.0])
-            pair = HeightMapPair(stamp, points, position, self.ground, robot, heading, config)
+            pair = HeightMapPair(stamp, points, position, self.ground, ROBOT, heading, config)
             events.append(list(localizer.update(pair)))
         return events
 
@@ -143,6 +144,26 @@ def test_a_claim_needs_the_newest_surface_over_the_ground_map(flight) -> None:
     assert not last.belief.converged
     said = "0% of the newest aerial map lies on the ground map, 30% are needed"
     assert said in last.belief.refusal
+
+
+def test_a_claim_needs_heights_of_the_newest_surface_that_agree(flight) -> None:
+    """Earlier ones, laid over the ground map as one with the newest, do not make up for it."""
+    config = changed(Config(), heading="search", headings=180)
+    *maps, (points, position) = flight.maps
+    camera = position.astype(np.float32)
+    middle = points[np.abs(points - camera)[:, :2].max(axis=1) < 0.6]
+    found = []
+    for last in (middle, camera + (middle - camera) * MIRROR):
+        localizer = MonteCarloLocalizer(config, np.random.default_rng(0))
+        for stamp, (surface, place) in enumerate([*maps, (last, position)]):
+            pair = HeightMapPair(stamp, surface, place, flight.ground, ROBOT, None, config)
+            *_, update = localizer.update(pair)
+        found.append(update.belief)
+    right, wrong = found
+    assert right.converged
+    np.testing.assert_allclose(wrong.estimate[:2], right.estimate[:2], atol=0.1)
+    assert not wrong.converged
+    assert "heights disagree: the newest agree over" in wrong.refusal
 
 
 def test_a_map_without_overlap_neither_kills_the_belief_nor_claims(flight):
