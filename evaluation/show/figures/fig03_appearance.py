@@ -1,4 +1,4 @@
-"""Beside Fig. 3: how often ASIFT locates the MAV, against view angle, light and print."""
+"""Beside Fig. 3: how often matched images locate the MAV, against view angle, light and print."""
 
 from __future__ import annotations
 

@@ -13,6 +13,8 @@ from evaluation.table.rows import ResultTable
 
 BEHIND = {
     "fig03_appearance": ("appearance", ""),
+    "fig03_appearance_xfeat": ("appearance", ""),
+    "fig03_appearance_disk": ("appearance", ""),
     "fig09_mav_error": ("trajectory_error", "mav_"),
     "fig10_ground_error": ("trajectory_error", "ground_"),
     "fig11_localization_error": ("localization", "error_m"),

@@ -17,6 +17,7 @@ from evaluation.measure.baselines.appearance import (
     looks,
     viewed_places,
 )
+from evaluation.measure.baselines.feature_matching import sift_matcher
 from evaluation.setup.condition import Condition
 from evaluation.show.report.appearance import appearance_figures, appearance_pairs
 from evaluation.table.row_writer import RowWriter
@@ -66,6 +67,7 @@ def test_rows_of_a_printed_floor_seen_from_the_usual_angle(
     """The control scene is all print: there matching succeeds."""
     monkeypatch.setattr(appearance, "LIGHT_TURNS_DEG", ())
     monkeypatch.setattr(appearance, "VIEW_ANGLES_DEG", (USUAL_ANGLE_DEG,))
+    monkeypatch.setattr(appearance, "installed_matchers", lambda: {"sift": sift_matcher()})
     scene = load_scene("flat")
     room = scene.room.model_copy(update={"size_m": (4.0, 4.0)})
     out = RowWriter("flat", 0, 0, CONDITION)
@@ -73,9 +75,12 @@ def test_rows_of_a_printed_floor_seen_from_the_usual_angle(
     table = ResultTable.from_rows(out.rows)
     assert table.values(STAGE, "located").tolist() == [1.0]
     assert table.values(STAGE, "right_matches")[0] > 100
+    assert table.values(STAGE, "sift_located").tolist() == [1.0]
+    assert table.values(STAGE, "sift_right_matches")[0] > 10
+    assert (table.frame["stage"] == STAGE).sum() == 2 + 2 * 2
 
 
-def made_up_table() -> ResultTable:
+def made_up_table(methods: tuple[str, ...] = ("",)) -> ResultTable:
     rng = np.random.default_rng(0)
     rows = []
     for scene in ("tiny", "outdoor"):
@@ -85,8 +90,10 @@ def made_up_table() -> ResultTable:
             out.add(STAGE, "light_turn_deg", look.light_turn_deg, "deg", trial=trial)
             if look.printed is not None:
                 out.add(STAGE, "printed", look.printed, "", trial=trial)
-            out.add(STAGE, "right_matches", rng.integers(100), "", trial=trial)
-            out.add(STAGE, "located", rng.random() < 0.5, "", trial=trial, note=look.varied)
+            for method in methods:
+                located = rng.random() < 0.5
+                out.add(STAGE, f"{method}right_matches", rng.integers(100), "", trial=trial)
+                out.add(STAGE, f"{method}located", located, "", trial=trial, note=look.varied)
         rows += out.rows
     return ResultTable.from_rows(rows)
 
@@ -100,6 +107,20 @@ def test_the_report_draws_a_curve_for_each_condition_and_scene() -> None:
     assert [len(axes.lines) for axes in shares] == [2, 2, 1]  # print: no boxes outdoors
     angles = [line.get_xdata() for line in shares[0].lines]
     assert [len(np.asarray(values)) for values in angles] == [5, 5]
+
+
+def test_learned_features_have_a_figure_of_their_own() -> None:
+    both, alone = made_up_table(("", "xfeat_")), made_up_table()
+    asift, xfeat = appearance_figures(both, CONDITION)
+    assert (asift.name, xfeat.name) == ("fig03_appearance", "fig03_appearance_xfeat")
+    assert "matched by XFeat and LighterGlue" in xfeat.caption
+    drawn = [
+        [line.get_ydata() for axes in figure.figure.axes for line in axes.lines]
+        for figure in (asift, xfeat)
+    ]
+    assert len(drawn[0]) == len(drawn[1])
+    assert any((a != b).any() for a, b in zip(*drawn, strict=True))
+    assert [figure.name for figure in appearance_figures(alone, CONDITION)] == ["fig03_appearance"]
 
 
 def test_without_rows_there_is_no_figure() -> None:
