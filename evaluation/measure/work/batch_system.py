@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from distributed import SpecCluster
+from distributed.security import Security
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from airground.errors import InputError, RecordingError
@@ -53,8 +54,12 @@ class Jobs(BaseModel):
     jobqueue: dict[str, dict[str, Any]] = Field(min_length=1, max_length=1)
 
 
-def batch_cluster(file: Path) -> SpecCluster:
+def batch_cluster(file: Path, keys: Path) -> SpecCluster:
     """Start the jobs that a file describes.
+
+    Args:
+        file: The description.
+        keys: Folder for the key of this run, which the jobs read and only this user can.
 
     Raises:
         InputError: The file is invalid, or Dask-jobqueue is not installed or fails.
@@ -73,11 +78,19 @@ def batch_cluster(file: Path) -> SpecCluster:
         python = f"env {WORKERS_MAY_RENDER} {options.pop('python', sys.executable)}"
         scheduler = {**NO_DASHBOARD, **options.pop("scheduler_options", {})}
         kind = getattr(module, CLASSES[system])
-        cluster = kind(**options, python=python, scheduler_options=scheduler)
+        cluster = kind(**_encrypted(options, keys), python=python, scheduler_options=scheduler)
         cluster.scale(jobs=jobs.jobs)
     except (TypeError, ValueError, RuntimeError, OSError) as error:
         raise InputError(f"--cluster {file}: {system}: {error}") from None
     return cast(SpecCluster, cluster)
+
+
+def _encrypted(options: dict[str, Any], keys: Path) -> dict[str, Any]:
+    """With TLS by a key of this run, unless the file names a protocol of its own."""
+    if "protocol" in options:
+        return options
+    own = {"protocol": "tls://", "security": Security.temporary()}
+    return {"shared_temp_directory": str(keys.resolve())} | options | own
 
 
 def read_jobs(file: Path) -> Jobs:

@@ -51,7 +51,8 @@ class Crew:
             running Dask scheduler; or a YAML file that describes jobs of a batch system.
         cores: Cores of this machine for all workers; a worker of a cluster uses one.
         tasks: Largest number of tasks at a time, and so of processes here.
-        scratch: Folder for temporary files of the workers on this machine.
+        scratch: Folder for temporary files of the workers on this machine, and for the key of jobs
+            of a batch system.
     """
 
     def __init__(self, cluster: str | None, cores: int, tasks: int, scratch: Path) -> None:
@@ -122,7 +123,7 @@ class Crew:
             client = self._stack.enter_context(Client(self._local(), set_as_default=False))
             worker = PreparedWorker(self.share(self._workers), str(self._scratch))
         else:
-            client = self._stack.enter_context(_joined(self._where, self._stack))
+            client = self._stack.enter_context(_joined(self._where, self._stack, self._scratch))
             _check(client, self._where)
             worker = PreparedWorker(threads=1)
         client.register_plugin(worker)
@@ -146,10 +147,11 @@ class Crew:
         return self._stack.enter_context(cluster)
 
 
-def _joined(where: str, stack: ExitStack) -> Client:
-    """A client of a running cluster, or of one that a batch system starts."""
+def _joined(where: str, stack: ExitStack, keys: Path) -> Client:
+    """A client of a running cluster, or of one that a batch system starts, with its key in the
+    folder `keys`."""
     if where.endswith((".yaml", ".yml")):
-        cluster = stack.enter_context(batch_cluster(Path(where)))
+        cluster = stack.enter_context(batch_cluster(Path(where), keys))
         _warn_unless_encrypted(where, cluster.scheduler_address)
         return Client(cluster, set_as_default=False)
     if "://" not in where:

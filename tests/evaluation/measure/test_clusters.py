@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
+import os
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import dask
 import pytest
 from distributed import Client, LocalCluster
+from distributed.security import Security
 
 from airground.errors import AirgroundError, InputError
 from evaluation.measure.work.batch_system import batch_cluster, read_jobs
 from evaluation.measure.work.crew import Crew
+from tests.evaluation.measure.connections import greeted, listening_ports
 
 SLURM = """
 jobs: 8
@@ -128,28 +133,50 @@ def test_an_invalid_file_is_an_error(old: str, new: str, message: str, tmp_path:
     assert old in SLURM
     file.write_text(SLURM.replace(old, new, 1))
     with pytest.raises(InputError, match=message):
-        batch_cluster(file)
+        batch_cluster(file, tmp_path)
 
 
-def test_jobs_without_encryption_are_named(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def started(_file: Path) -> LocalCluster:
-        return LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0")
+JOBS = """
+jobs: 1
+jobqueue:
+  local: {cores: 1, processes: 1, memory: 4GB, interface: lo, local_directory: FOLDER}
+"""
 
-    monkeypatch.setattr("evaluation.measure.work.crew.batch_cluster", started)
-    with caplog.at_level(logging.WARNING):
-        assert squares(str(tmp_path / "slurm.yaml"), tmp_path) == [(0, 1), (1, 4), (2, 9)]
-    assert "runs code as you" in caplog.text
+
+def modes_of_keys(_: int, folder: Path) -> set[str]:
+    return {oct(path.stat().st_mode & 0o777) for path in folder.glob(".dask-jobqueue.worker.*")}
 
 
 @pytest.mark.slow
 @pytest.mark.subject("evaluation/measure/work", "evaluation/setup", "airground/errors.py")
-def test_jobs_run_tasks(tmp_path: Path) -> None:
+def test_jobs_run_tasks_and_accept_only_the_key_of_the_run(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    pytest.importorskip("dask_jobqueue")
+    file, keys = tmp_path / "local.yaml", tmp_path / "keys"
+    keys.mkdir()
+    file.write_text(JOBS.replace("FOLDER", str(tmp_path)))
+    with caplog.at_level(logging.WARNING), Crew(str(file), 1, 3, keys) as crew:
+        modes = [mode for _, mode in crew.outcomes(partial(modes_of_keys, folder=keys), [0])]
+        assert modes == [{"0o600"}]
+        assert sorted(crew.outcomes(square, [1, 2, 3])) == [(0, 1), (1, 4), (2, 9)]
+        for port in listening_ports(os.getpid()):
+            with pytest.raises((OSError, TimeoutError)):
+                asyncio.run(greeted(f"tls://127.0.0.1:{port}", Security.temporary()))
+            with pytest.raises((OSError, TimeoutError)):
+                asyncio.run(greeted(f"tcp://127.0.0.1:{port}", Security()))
+    assert "runs code as you" not in caplog.text
+
+
+@pytest.mark.slow
+@pytest.mark.subject("evaluation/measure/work", "evaluation/setup", "airground/errors.py")
+def test_jobs_of_a_file_that_names_a_protocol_use_it(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
     pytest.importorskip("dask_jobqueue")
     file = tmp_path / "local.yaml"
-    file.write_text(
-        "jobs: 1\njobqueue:\n  local: {cores: 1, processes: 1, memory: 4GB, interface: lo,"
-        f" local_directory: {tmp_path}}}\n"
-    )
-    assert squares(str(file), tmp_path) == [(0, 1), (1, 4), (2, 9)]
+    lines = JOBS.replace("FOLDER", str(tmp_path)).replace("cores: 1", "cores: 1, protocol: tcp")
+    file.write_text(lines)
+    with caplog.at_level(logging.WARNING):
+        assert squares(str(file), tmp_path) == [(0, 1), (1, 4), (2, 9)]
+    assert "runs code as you" in caplog.text
