@@ -303,8 +303,13 @@ class TestRun:
         assert without_reader(script) == (expected, b"")
 
     def test_the_pipe_of_another_process_is_no_reader(
-        self, capsys: pytest.CaptureFixture[str]
+        self,
+        capsys: pytest.CaptureFixture[str],
+        monkeypatch: pytest.MonkeyPatch,
+        tmp_path: Path,
     ) -> None:
+        monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+
         def command() -> None:
             raise BrokenPipeError
 
