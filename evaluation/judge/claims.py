@@ -103,7 +103,7 @@ class Localizations:
 
     Attributes:
         error_m, spread_m: (N,) horizontal error and the particles' standard deviation [m].
-        squared_mahalanobis: (N,) distance of the true position in the particles' covariance.
+        squared_mahalanobis: (N,) distance of the true position in the belief's covariance.
         accepted: (N,) whether a position was claimed.
     """
 

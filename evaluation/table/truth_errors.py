@@ -74,8 +74,8 @@ def squared_mahalanobis(belief: Belief, sighting: Sighting, truth: Truth) -> flo
     The error is that of the particles: at the camera that the surface was seen from.
 
     Returns:
-        d^T P^-1 d of the horizontal error d and the particles' covariance P; infinite where
-        all particles are in one line or place.
+        d^T P^-1 d of the horizontal error d and the belief's covariance P; infinite where
+        P has no extent in some direction.
     """
     position_mav = sighting.surface.T_mav_camera.translation
     true_position = true_T_ground_mav(sighting, truth) @ position_mav

@@ -80,12 +80,12 @@ def calibration_figures(table: ResultTable, condition: Condition) -> Iterator[Re
     if len(found):
         yield ReportFigure(
             "calibration",
-            "Calibration: does the spread fit the error?",
-            "Left: how often the true position lies in the ellipse of the particles' covariance "
-            "around the reported position, with 95 % Wilson intervals at 50, 90 and 99 %. Below "
-            "the dashed line the particles are overconfident. Right: error and spread of "
-            "each localization. Aerial maps of one sequence are not independent. "
-            f"{_beyond(found)}{condition.label()}.",
+            "Calibration: do reported covariances fit the errors?",
+            "Left: how often the true position lies in the ellipse of the reported covariance "
+            "(particles, and errors of both robots' poses), with 95 % Wilson intervals at 50, 90 "
+            "and 99 %; below the dashed line it is overconfident. Right: error and spread of the "
+            "particles. Aerial maps of one sequence are not independent. "
+            f"{_beyond(found)}Conditions: {condition.label()}.",
             calibration_figure(found),
         )
 
