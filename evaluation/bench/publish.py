@@ -40,7 +40,7 @@ def print_table(report: BenchReport, screen: Console) -> None:
 def markdown(report: BenchReport) -> str:
     """The table, the conditions and the exponents, for a page of the docs."""
     lines = text.markdown_table(header(report), body(report))
-    lines += ["", *(f"- {line}" for line in footnotes(report))]
+    lines += ["", *(f"- {text.markdown_text(line)}" for line in footnotes(report))]
     if report.curves:
         titles = ["time of", "over", "power", "of CPU time", "medians [ms]"]
         lines += ["", *text.markdown_table(titles, [_curve(curve) for curve in report.curves])]

@@ -108,7 +108,7 @@ class Simulate(BenchmarkOptions, DatasetOptions, SensorOption, SeedOption, OutOp
         if self.flights is not None:
             raise InputError("--flights: only with --level")
         dials = parse_dials(self.dials)
-        asked = Subject(load_scene(self.scenes[0]), sensor_preset(self.sensors), Config())
+        asked = Subject(load_scene(self.scenes[0]), sensor_preset(self.sensors_name()), Config())
         subject, seed = turned(asked, dials), self.checked_seed()
         scene = subject.scene
         flight = int(in_range("--flight", self.flight))
@@ -142,13 +142,12 @@ class Simulate(BenchmarkOptions, DatasetOptions, SensorOption, SeedOption, OutOp
         from evaluation.setup.progress import announce
         from sim.scene import load_scene
 
-        if not self.scenes or self.seed or self.flight or self.dials:
+        if not self.scenes or self.seed is not None or self.flight or self.dials:
             raise InputError("--seeds: with at least one SCENE, no --seed, --flight or --dial")
         if self.sealed is not None or self.flights is not None:
             raise InputError("--seeds: without --sealed and --flights; --level makes a benchmark")
-        plan = plan_dataset(
-            self.scenes, parse_seeds(seeds), parse_split(self.split), self.sensors, self.duration_s
-        )
+        split, sensors = parse_split(self.split), self.sensors_name()
+        plan = plan_dataset(self.scenes, parse_seeds(seeds), split, sensors, self.duration_s)
         jobs = int(in_range("--jobs", self.jobs, low=1, high=1000))
         scenes = {scene: load_scene(scene) for scene in self.scenes}
         seconds = sum(self.duration_s or scenes[world.scene].duration_s for world in plan.worlds)
@@ -162,8 +161,8 @@ class Simulate(BenchmarkOptions, DatasetOptions, SensorOption, SeedOption, OutOp
         from evaluation.measure.levels.level import load_level
         from evaluation.setup.progress import announce
 
-        given = self.scenes, self.seeds, self.split, self.dials, self.flight, self.duration_s
-        if any(given) or self.jobs != 1 or self.sensors != "nominal":
+        given = self.scenes, self.seeds, self.split, self.dials, self.duration_s, self.sensors
+        if any(given) or self.jobs != 1 or self.flight:
             raise InputError(f"--level {name}: fixes all but --flights, --seed, --sealed and --out")
         level = load_level(name)
         flights = level.flights if self.flights is None else self.flights

@@ -20,6 +20,7 @@ from evaluation.commands.options import (
     recorded,
 )
 from evaluation.commands.run import simulated, write_measured
+from evaluation.commands.sections import USED
 
 if TYPE_CHECKING:
     from evaluation.run.live.playback import Playback
@@ -66,6 +67,8 @@ class Live(PlaybackOptions, RadioOptions, PipelineOptions, SeedOption, OutOption
     dropped.json, which names the images that came too fast. To draw a live run, repeat it by
     run RECORDING --drops DIR/dropped.json --rerun, which gives the same result.
     """
+
+    sections: ClassVar[tuple[str, ...]] = USED["live"]
 
     recording: Annotated[Positional[Path], Shown("RECORDING")]
     """folder that simulate has written"""

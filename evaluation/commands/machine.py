@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from airground.errors import InputError
 from evaluation.commands.options import (
     RENDER_S_PER_S,
     SeedOption,
@@ -61,6 +62,7 @@ class Bench(SensorOption, SeedOption, Verb):
         from evaluation.setup.progress import announce, step
         from sim.scene import load_scene
 
+        self._check_used()
         names = checked_names([name for name in self.rows.split(",") if name])
         seconds = in_range("--seconds-a-row", self.seconds_a_row, low=0.0, high=3600)
         if self.out is not None:
@@ -89,6 +91,15 @@ class Bench(SensorOption, SeedOption, Verb):
         else:
             print_table(report, Console())
 
+    def _check_used(self) -> None:
+        """InputError for what describes the new recording, if another one is given."""
+        for word, given in (("--sensors", self.sensors), ("--seed", self.seed)):
+            if self.recording is not None and given is not None:
+                raise InputError(
+                    f"{word} {given}: of the recording that bench makes, but --recording gives "
+                    f"{self.recording}; give one of the two"
+                )
+
     def _parts(self, names: Sequence[str]) -> int:
         """How many parts the benchmark names as it goes on."""
         from evaluation.bench.curves import CURVES
@@ -104,7 +115,7 @@ class Bench(SensorOption, SeedOption, Verb):
         from sim.scene import load_scene
         from sim.sensors.presets import sensor_preset
 
-        sensors, seed = sensor_preset(self.sensors), self.checked_seed()
+        sensors, seed = sensor_preset(self.sensors_name()), self.checked_seed()
         record(load_scene(SCENE), seed, sensors, path, workers=self.workers())
         return path
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 from tyro.conf import UseAppendAction, arg
 
 from airground.errors import InputError
+from evaluation.commands import sections
 from evaluation.setup.environment import usable_cores
 
 if TYPE_CHECKING:
@@ -37,6 +38,8 @@ MAV_MB_PER_S, GROUND_MB_PER_S = 6.0, 20.0
 """Images of each robot on the disk, without loss: noise of the sensors cannot be compressed."""
 MEASURE_S_PER_S = 3.0
 """The paper's protocol with one kind of maps: 2 without baselines, 4 with all of them."""
+
+ERRORS_OF_SLAM = "section oracle adds errors to true poses; give --poses oracle"
 
 
 def on_disk(seconds: float, every: int = 1, only: str | None = None) -> str:
@@ -134,11 +137,12 @@ class SeedOption:
 
     heading: ClassVar[str] = "input"
 
-    seed: Annotated[int, Shown("N")] = 0
+    seed: Annotated[int | None, Shown("N", "0")] = None
     """seed of everything random; the same seed gives the same result"""
 
     def checked_seed(self) -> int:
-        return int(in_range("--seed", self.seed, low=0, high=2**63 - 1))
+        """The seed, 0 if none is given; InputError if it is out of its range."""
+        return int(in_range("--seed", self.seed or 0, low=0, high=2**63 - 1))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,9 +151,16 @@ class SensorOption:
 
     heading: ClassVar[str] = "input"
 
-    sensors: Literal["none", "nominal", "harsh", "paper", "real"] = "nominal"
+    sensors: Annotated[
+        Literal["none", "nominal", "harsh", "paper", "real"] | None,
+        Shown("{none,nominal,harsh,paper,real}", "nominal"),
+    ] = None
     """noise and calibration errors; paper: sensors of 2013; real: nominal ones with distortion,
     rolling shutters, automatic exposure"""
+
+    def sensors_name(self) -> str:
+        """The preset of the sensors, `nominal` if none is given."""
+        return self.sensors or "nominal"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,8 +168,8 @@ class ConfigOptions:
     """Parameters of the pipeline."""
 
     heading: ClassVar[str] = "pipeline"
-    sections: ClassVar[tuple[str, ...]] = ()
-    """Sections of the configuration that the verb uses beside the pipeline's."""
+    sections: ClassVar[tuple[str, ...]] = sections.PIPELINE
+    """Sections of the configuration that the verb uses."""
 
     preset: Annotated[Literal["best", "paper", "paper_literal"] | None, Shown("NAME", "best")] = (
         None
@@ -172,10 +183,25 @@ class ConfigOptions:
     """one parameter, as in localization.particles=400; repeatable"""
 
     def settings(self, heading: str | None = None) -> Settings:
-        """All parameters that the options ask for."""
+        """All parameters that the options ask for.
+
+        Raises:
+            ConfigError: One is wrong, or `--set` gives one that would change nothing.
+        """
         from evaluation.setup.settings import resolve_all
 
-        return resolve_all(self.preset, self.config, self.overrides, heading, self.sections)
+        return resolve_all(
+            self.preset, self.config, self.overrides, heading, self.sections, self.idle
+        )
+
+    def idle(self, section: str, key: str) -> str:
+        """Why a parameter would change nothing beside the other options; empty if it may."""
+        verb = type(self).__name__.lower()
+        return "" if section in self.sections else sections.unused(verb, section)
+
+    def sets(self, name: str) -> bool:
+        """Whether `--set` gives the parameter SECTION.NAME."""
+        return any(word.partition("=")[0].strip() == name for word in self.overrides)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,7 +209,7 @@ class PipelineOptions(ConfigOptions):
     """All that makes a setup: the pipeline's parameters and the source of the poses."""
 
     heading: ClassVar[str] = "pipeline"
-    sections: ClassVar[tuple[str, ...]] = ("oracle",)
+    sections: ClassVar[tuple[str, ...]] = (*sections.PIPELINE, "oracle")
 
     poses: Literal["slam", "oracle"] = "slam"
     """own SLAM, or true poses with the errors of section oracle"""
@@ -191,6 +217,13 @@ class PipelineOptions(ConfigOptions):
         Literal["known", "search"] | None, arg(name="heading"), Shown("{known,search}", "known")
     ] = None
     """from the magnetometers, or searched as a third dimension"""
+
+    def idle(self, section: str, key: str) -> str:
+        if section in sections.SLAM.values() and self.poses == "oracle":
+            return "--poses oracle puts true poses in place of SLAM"
+        if section == "oracle" and self.poses == "slam":
+            return ERRORS_OF_SLAM
+        return super().idle(section, key)
 
     def setup(self) -> Setup:
         """The setup.
@@ -203,7 +236,7 @@ class PipelineOptions(ConfigOptions):
         settings = self.settings(self.north)
         noise = settings.oracle.noise()
         if self.poses == "slam" and noise != EXACT:
-            raise InputError("section oracle adds errors to true poses; give --poses oracle")
+            raise InputError(ERRORS_OF_SLAM)
         reference = settings.reference.reference()
         if reference.by == "paths" and reference != Reference("paths"):
             raise InputError("reference.by=paths uses no calibration of cameras: give no errors")

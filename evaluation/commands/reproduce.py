@@ -21,12 +21,12 @@ from evaluation.commands.options import (
     in_range,
     work_s,
 )
+from evaluation.commands.sections import USED
 
 if TYPE_CHECKING:
     from evaluation.measure.levels.level import Level
     from evaluation.measure.plans.reproduce import Plan
     from evaluation.measure.protocol.trials import Protocol
-    from evaluation.setup.setups import Setup
     from sim.recording.recorder import Flight
 
 
@@ -98,7 +98,7 @@ class Reproduce(
     Section protocol says how much is measured on each flight (docs/parameters.md).
     """
 
-    sections: ClassVar[tuple[str, ...]] = ("oracle", "reference", "protocol")
+    sections: ClassVar[tuple[str, ...]] = USED["reproduce"]
 
     quick: Annotated[bool, _SMALLER] = False
     """one small scene and a short flight: minutes instead of hours"""
@@ -161,6 +161,8 @@ class Reproduce(
         for field in ("budget", "scenes", "flights", "sequences"):
             if getattr(self, field):
                 raise InputError(f"--{field}: the suite {name} is fixed; give it without --suite")
+        if self.alone:
+            raise InputError(f"--alone: the suite {name} has one setup anyway; leave it out")
         if self.settings().protocol != ProtocolCounts():
             raise InputError(f"section protocol: the suite {name} is fixed")
         sensors = sensor_preset(self.sensors or FULL.sensors)
@@ -172,7 +174,7 @@ class Reproduce(
         from evaluation.setup.setups import with_companions
 
         level = self._level()
-        setup = self.setup() if level is None else self._setup_at(level)
+        setup = (self if level is None else replace(self, north=level.heading)).setup()
         if self.budget and setup.poses != "slam":
             raise InputError("--budget asks what SLAM loses among others; give --poses slam")
         extent = self._extent(setup.config.preset, level)
@@ -192,20 +194,16 @@ class Reproduce(
 
         if self.level is None:
             return None
-        fixed = {"scenes": self.scenes, "sensors": self.sensors, "heading": self.north}
+        fixed: dict[str, object] = {
+            "scenes": self.scenes,
+            "sensors": self.sensors,
+            "heading": self.north,
+            "set localization.heading": self.sets("localization.heading"),
+        }
         for word, given in fixed.items():
             if given:
                 raise InputError(f"--{word}: level {self.level} fixes it; give it without --level")
         return load_level(self.level)
-
-    def _setup_at(self, level: Level) -> Setup:
-        """The setup with the level's heading."""
-        setup = replace(self, north=level.heading).setup()
-        if setup.config.localization.heading != level.heading:
-            raise InputError(
-                f"--set localization.heading: level {level.name} fixes it; give it without --level"
-            )
-        return setup
 
     def _flights(self, extent: Extent, level: Level | None) -> list[Flight]:
         from evaluation.measure.plans.reproduce import flights_over

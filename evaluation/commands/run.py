@@ -23,6 +23,7 @@ from evaluation.commands.options import (
     Verb,
     recorded,
 )
+from evaluation.commands.sections import SLAM, USED
 
 if TYPE_CHECKING:
     from airground.config import Config
@@ -127,12 +128,26 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
     Leaves the map, poses, claims and the report. Your own and sealed recordings need no truth.
     """
 
-    sections: ClassVar[tuple[str, ...]] = ("oracle", "rerun")
+    sections: ClassVar[tuple[str, ...]] = USED["run"]
 
     recording: Annotated[Positional[Path | None], Shown("RECORDING")] = None
     """folder that simulate has written"""
     drops: Annotated[Path | None, Shown("FILE")] = None
     """leave out the images that a live run dropped (its dropped.json)"""
+
+    def idle(self, section: str, key: str) -> str:
+        if section == "rerun" and not self.draws:
+            return "nothing is drawn without --rerun"
+        given = {
+            SLAM["mav"]: self.mav_trajectory,
+            SLAM["ground"]: self.ground_trajectory,
+            "ground_mapping": self.ground_map,
+        }
+        file = given.get(section)
+        # The augmented map has its voxels, whoever made the ground robot's map.
+        if file is not None and (section, key) != ("ground_mapping", "voxel_m"):
+            return f"{file} is given in place of this stage"
+        return super().idle(section, key)
 
     def main(self) -> None:
         from airground.io.recording import Recording

@@ -21,6 +21,7 @@ from evaluation.commands.options import (
     in_range,
     work_s,
 )
+from evaluation.commands.sections import USED
 
 if TYPE_CHECKING:
     from evaluation.measure.plans.sweep import SweepPlan
@@ -39,7 +40,7 @@ class Sweep(SensorOption, SeedOption, PipelineOptions, ResumableOutOption, Clust
     of the configuration says how much is measured on each flight (docs/parameters.md).
     """
 
-    sections: ClassVar[tuple[str, ...]] = ("oracle", "reference", "protocol")
+    sections: ClassVar[tuple[str, ...]] = USED["sweep"]
 
     vary: Annotated[UseAppendAction[tuple[str, ...]], Shown("NAME=VALUE,VALUE,...")] = ()
     """dial (docs/sweep.md) or parameter, with values; repeatable"""
@@ -83,12 +84,15 @@ class Sweep(SensorOption, SeedOption, PipelineOptions, ResumableOutOption, Clust
             raise InputError("protocol.baselines: a sweep tries no baselines")
         if self.duration_s is not None:
             in_range("--duration-s", self.duration_s, low=1, high=600)
+        varied = parse_vary(self.vary)
+        for vary in varied:
+            self._check_alone(vary.name)
         plan = SweepPlan(
-            varied=parse_vary(self.vary),
+            varied=varied,
             scenes=tuple(load_scene(scene) for scene in self.scenes),
             flights=int(in_range("--flights", self.flights, low=1)),
             setup=self.setup(),
-            sensors=sensor_preset(self.sensors),
+            sensors=sensor_preset(self.sensors_name()),
             protocol=Protocol(asked.sequences_per_flight or SEQUENCES, asked.trials or TRIALS),
             seed=self.checked_seed(),
             duration_s=self.duration_s,
@@ -96,3 +100,13 @@ class Sweep(SensorOption, SeedOption, PipelineOptions, ResumableOutOption, Clust
         for point in plan.points():
             plan.units(point)
         return plan
+
+    def _check_alone(self, name: str) -> None:
+        """InputError if what is varied changes nothing, or has a value by another option, too."""
+        section, _, key = name.partition(".")
+        if reason := self.idle(section, key):
+            raise InputError(f"--vary {name}: {reason}")
+        by_heading = name == "localization.heading" and self.north is not None
+        if by_heading or self.sets(name):
+            word = "--heading" if by_heading else f"--set {name}"
+            raise InputError(f"{word}: --vary gives its values; give one of the two")

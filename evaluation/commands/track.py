@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from tyro.conf import Positional
 
@@ -20,6 +20,7 @@ from evaluation.commands.options import (
     Verb,
     recorded,
 )
+from evaluation.commands.sections import SLAM, USED
 
 if TYPE_CHECKING:
     from airground.core.cloud import Source
@@ -44,6 +45,16 @@ class Track(FolderOptions, ConfigOptions, SeedOption, OutOption, Verb):
     trajectory: Annotated[Path | None, Shown("FILE")] = None
     """poses for the front end file: TUM, of the camera, metric, z up"""
 
+    sections: ClassVar[tuple[str, ...]] = USED["track"]
+
+    def idle(self, section: str, key: str) -> str:
+        if section not in self.sections:
+            return super().idle(section, key)
+        if "slam" not in self._names():
+            return f"only slam has parameters; the front end is {', '.join(self._names())}"
+        mine = SLAM[self._source().name.lower()]
+        return "" if section == mine else f"the SLAM of this robot uses section {mine}"
+
     def main(self) -> None:
         from evaluation.run.own_recordings import print_alone, run_alone, write_alone
         from evaluation.setup.output import fresh_folder
@@ -52,6 +63,7 @@ class Track(FolderOptions, ConfigOptions, SeedOption, OutOption, Verb):
         from evaluation.table.true_camera import true_camera
 
         names, robot = self._names(), self._source()
+        self._check_used(names, robot)
         with fresh_folder(self.out) as out:
             recording = self.open(self.folder, robot)
             true_pose = true_camera(recording)
@@ -72,6 +84,17 @@ class Track(FolderOptions, ConfigOptions, SeedOption, OutOption, Verb):
                 draw_front_ends(out, recording, results, true_pose)
         for summary in summaries:
             print_alone(summary)
+
+    def _check_used(self, names: list[str], robot: Source) -> None:
+        """InputError if an option would change nothing."""
+        for word, given in (("--preset", self.preset), ("--config", self.config)):
+            if given is not None and "slam" not in names:
+                raise InputError(
+                    f"{word} {given}: only slam has parameters; the front end is {', '.join(names)}"
+                )
+        if self.depth_scale is not None and robot.name == "MAV":
+            raise InputError("--depth-scale: the MAV has no depth images; leave it out")
+        self.settings()
 
     def _names(self) -> list[str]:
         """The front ends, each once; a trajectory asks for the front end that follows it."""

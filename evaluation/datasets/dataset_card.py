@@ -11,6 +11,7 @@ from typing import Any
 from airground import __version__
 from airground.io.digests import file_digest
 from airground.io.header import Header
+from evaluation.setup.text import markdown_text
 from sim.robots.motion import Robot
 
 CROISSANT = "http://mlcommons.org/croissant/"
@@ -94,9 +95,9 @@ def write_dataset_card(folder: Path, header: Header, shards: Sequence[Shard]) ->
         *configurations,
         "---",
         "",
-        f"# {_title(header)}",
+        f"# {markdown_text(_title(header))}",
         "",
-        f"{_description(header)} Samples: {', '.join(counts)}.",
+        f"{markdown_text(_description(header))} Samples: {', '.join(counts)}.",
         "",
         "Poses map camera coordinates (x right, y down, z forward) to the world (z up), in metres.",
         "Integer pixel coordinates are pixel centres. Images are lossless. A sample has:",

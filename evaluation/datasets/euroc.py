@@ -3,6 +3,8 @@ The body of T_BS is the IMU. EuRoC itself has no magnetometer (`mag0/`)."""
 
 from __future__ import annotations
 
+import json
+import re
 import shutil
 from pathlib import Path
 
@@ -30,6 +32,8 @@ STATE_COLUMNS = (
 BIAS_WINDOW_S = 1.0
 """Standard deviation of the Gaussian that averages a sample's errors to its bias [s]."""
 SURFACE_POINTS = 200_000
+_PLAIN = re.compile(r"[\w ,]+")
+"""Text that needs no quotes in YAML."""
 
 
 def write_euroc_folder(folder: Path, simulated: Simulated, robots: tuple[Robot, ...]) -> None:
@@ -44,6 +48,8 @@ def write_euroc_folder(folder: Path, simulated: Simulated, robots: tuple[Robot, 
         _write_yaml(folder / sensor / "sensor.yaml", yaml)
     header = recording.header
     comment = f"airground {header.scene}, seed {header.seed}, flight {header.flight}"
+    if not _PLAIN.fullmatch(comment):
+        comment = json.dumps(comment)
     _write_yaml(folder / "mav0" / "body.yaml", f"comment: {comment}\n")
     state = folder / "mav0" / "state_groundtruth_estimate0"
     state.mkdir()
@@ -56,13 +62,14 @@ def write_euroc_folder(folder: Path, simulated: Simulated, robots: tuple[Robot, 
 
 
 def true_imu(simulated: Simulated, robot: Robot) -> tuple[Trajectory, NDArray[np.float64]]:
-    """The IMU at 200 Hz: `T_world_imu`, and its velocity in the world (N, 3) [m/s]."""
+    """The IMU at 200 Hz, stamped by the robot's clock: `T_world_imu`, and its velocity in the world
+    (N, 3) [m/s]."""
     motion = simulated.motion(robot)
     T_body_imu = motion.mounting.T_body_imu
     arm = T_body_imu.translation
     rotations = motion.rotations_world
     poses = Trajectory(
-        simulated.truth.motion.stamps_ns,
+        simulated.motion_stamps_ns(robot),
         rotations @ T_body_imu.rotation,
         motion.positions_world + rotations @ arm,
     )
@@ -86,12 +93,13 @@ def _biases(simulated: Simulated) -> NDArray[np.float64]:
     White noise remains with its density over sqrt(2 sqrt(pi) BIAS_WINDOW_S). Where samples are
     missing, biases are interpolated."""
     samples, _ = simulated.samples("mav")
-    motion, stamps_ns = simulated.motion("mav"), simulated.truth.motion.stamps_ns
+    motion, motion_ns = simulated.motion("mav"), simulated.truth.motion.stamps_ns
+    times_ns = simulated.imu_times_ns("mav")
     measured = np.hstack([samples.gyro, samples.accelerometer])
     true = np.hstack([motion.gyro_imu, motion.specific_force_imu])
-    errors = measured - true[np.searchsorted(stamps_ns, samples.stamps_ns)]
+    errors = measured - true[np.searchsorted(motion_ns, times_ns)]
     smooth = gaussian_filter1d(errors, BIAS_WINDOW_S * RATE_HZ, axis=0, mode="nearest")
-    return np.column_stack([np.interp(stamps_ns, samples.stamps_ns, bias) for bias in smooth.T])
+    return np.column_stack([np.interp(motion_ns, times_ns, bias) for bias in smooth.T])
 
 
 def _write_yaml(path: Path, text: str) -> None:

@@ -24,7 +24,8 @@ _NOISE = 3
 def render_scans(
     simulated: Simulated, lidar: Lidar, every: int, out: Path, done: Callable[[], None]
 ) -> None:
-    """Write `out/ground_lidar/` with a file for each scan; it is whole or not there.
+    """Write `out/ground_lidar/` with a file for each scan, named by its start on the clock of the
+    ground robot; it is whole or not there.
 
     Args:
         simulated: Recording with its truth.
@@ -42,10 +43,11 @@ def render_scans(
         sensor = asdict(lidar) | {"T_body_lidar": T_body_lidar.matrix().tolist()}
         (folder / SENSOR).write_text(tomli_w.dumps(sensor), encoding="utf-8")
         starts_ns = scan_starts_ns(truth, lidar)
+        stamps_ns = truth.clock("ground").stamps_ns(starts_ns)
         for index in range(0, len(starts_ns), every):
             rng = np.random.default_rng([header.seed, header.flight, _NOISE, index + 1])
             start_ns = int(starts_ns[index])
-            write_pcd(folder / f"{start_ns}.pcd", lidar_scan(truth, lidar, start_ns, rng))
+            write_pcd(folder / f"{stamps_ns[index]}.pcd", lidar_scan(truth, lidar, start_ns, rng))
             done()
 
 

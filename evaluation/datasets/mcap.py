@@ -85,7 +85,7 @@ def _mountings(simulated: Simulated, robots: tuple[Robot, ...]) -> list[tuple[st
 def _truth(simulated: Simulated, robot: Robot) -> Iterator[Message]:
     motion, body = simulated.motion(robot), f"{robot}/{BODY}"
     velocities = np.einsum("nji,nj->ni", motion.rotations_world, motion.velocities_world)
-    for index, stamp in enumerate(simulated.truth.motion.stamps_ns.tolist()):
+    for index, stamp in enumerate(simulated.motion_stamps_ns(robot).tolist()):
         T = SE3(motion.rotations_world[index], motion.positions_world[index])
         yield stamp, "/tf", ros.transforms(stamp, [(WORLD, body, T)])
         rates = velocities[index], motion.angular_velocities_body[index]

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airground.core.cloud import Source
 from airground.core.messages import ImuSamples, MagneticSamples
@@ -37,7 +38,8 @@ class Simulated:
         """Open a recording, and compare its files with their digests.
 
         Raises:
-            InputError: It is no recording of simulate, is damaged, or has no truth.
+            InputError: It is no recording of simulate, is damaged, has no truth, or has images
+                outside of its motion.
         """
         if path.is_dir() and not (path / HEADER).exists():
             raise InputError(
@@ -48,14 +50,17 @@ class Simulated:
         recording.verify()
         assert isinstance(recording.images, ImageFiles)
         truth = Truth.open(path)
-        for robot in recording.robots.values():
-            assert robot.imu is not None
+        simulated = cls(recording, truth, recording.images)
+        for robot in simulated.robots:
+            stamps_ns = simulated.stamps_ns(robot)
+            for stamp_ns in (stamps_ns[0], stamps_ns[-1]):
+                truth.row_poses(robot, stamp_ns)
             # An IMU may have been silent for a while, and the truth goes on.
-            if not np.isin(robot.imu.stamps_ns, truth.motion.stamps_ns).all():
+            if not np.isin(simulated.imu_times_ns(robot), truth.motion.stamps_ns).all():
                 raise RecordingError(
-                    f"{truth.folder}: its motion has other stamps than the {robot.robot.name} IMU"
+                    f"{truth.folder}: its motion has other stamps than the {robot.upper()} IMU"
                 )
-        return cls(recording, truth, recording.images)
+        return simulated
 
     @property
     def robots(self) -> tuple[Robot, ...]:
@@ -93,6 +98,15 @@ class Simulated:
         assert sensed.imu is not None
         assert sensed.magnetic is not None
         return sensed.imu, sensed.magnetic
+
+    def imu_times_ns(self, robot: Robot) -> NDArray[np.int64]:
+        """(N,) times of the motion at which the robot's inertial samples were taken [ns]."""
+        samples, _ = self.samples(robot)
+        return self.truth.clock(robot).times_ns(samples.stamps_ns)
+
+    def motion_stamps_ns(self, robot: Robot) -> NDArray[np.int64]:
+        """(N,) stamps by the robot's clock of the states of its motion [ns]."""
+        return self.truth.clock(robot).stamps_ns(self.truth.motion.stamps_ns)
 
     def T_imu_camera(self, robot: Robot) -> SE3:
         """Nominal pose of the camera."""

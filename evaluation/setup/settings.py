@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -119,6 +119,7 @@ def resolve_all(
     overrides: Sequence[str] = (),
     heading: str | None = None,
     sections: Sequence[str] = (),
+    idle: Callable[[str, str], str] = lambda section, key: "",
 ) -> Settings:
     """All parameters that the command line asks for.
 
@@ -126,11 +127,14 @@ def resolve_all(
         preset: A name in `PRESETS`; None for that of `file`, or else "best".
         file: TOML with any subset of the sections.
         overrides: "section.name=value", the value as in TOML; they win over the file.
-        heading: Short for localization.heading; wins over the file, not over `overrides`.
-        sections: Sections of `EVALUATOR_SECTIONS` that have a meaning here.
+        heading: Short for localization.heading, which `overrides` then lack; wins over the file.
+        sections: Sections of `EVALUATOR_SECTIONS` that have a meaning here, among others.
+        idle: Why a parameter (section, name) of `overrides` would change nothing; empty if it may.
+            A file may have parameters that change nothing, so that one serves all verbs.
 
     Raises:
-        ConfigError: A name is unknown, a value is out of its range, or the file is no TOML.
+        ConfigError: A name is unknown, a value is out of its range, or the file is no TOML; or
+            one of `overrides` changes nothing, comes twice, or contradicts `heading`.
     """
     contents = _read(file) if file is not None else {}
     named = contents.pop("preset", None)
@@ -150,9 +154,18 @@ def resolve_all(
             settings = with_value(settings, section, key, value, str(file), unused)
     if heading is not None:
         settings = with_value(settings, "localization", "heading", heading, "--heading")
+    seen = set()
     for override in overrides:
         section, key, value = _split(override)
-        settings = with_value(settings, section, key, value, f"--set {override}", unused)
+        name, origin = f"{section}.{key}", f"--set {override}"
+        if reason := idle(section, key):
+            raise ConfigError(f"{origin}: {reason}")
+        if heading is not None and name == "localization.heading":
+            raise ConfigError(f"{origin}: --heading {heading} sets it as well; give one of the two")
+        if name in seen:
+            raise ConfigError(f"{origin}: {name} is given twice")
+        seen.add(name)
+        settings = with_value(settings, section, key, value, origin, unused)
     return settings
 
 

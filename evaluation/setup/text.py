@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,6 +18,8 @@ FAILED = "failed"
 """A quantile that failures reach: they count as infinitely large errors."""
 FINE_M = 0.1
 """Lengths below this are given in millimetres [m]."""
+_MARKS = re.compile(r"[\\|*<`]|(?<![^\W_])_|_(?![^\W_])|(?<=\])\(|&(?=#?\w+;)|~(?=~)")
+"""Marks of Markdown that change what a line shows."""
 
 
 @dataclass(frozen=True)
@@ -63,10 +66,17 @@ def milliseconds(value: float | None) -> str:
     return f"{value:.0f}" if value >= 100 else f"{value:.1f}" if value >= 10 else f"{value:.2f}"
 
 
+def markdown_text(text: object) -> str:
+    """One line of Markdown that shows a text as it is: names in data may hold tags, bars, links and
+    line breaks. An underscore inside a word is none of Markdown's marks."""
+    return _MARKS.sub(r"\\\g<0>", " ".join(str(text).split()))
+
+
 def markdown_table(titles: Sequence[object], rows: Sequence[Sequence[object]]) -> list[str]:
-    """Lines of a table in Markdown."""
-    lines = (titles, ["---"] * len(titles), *rows)
-    return ["| " + " | ".join(map(str, line)) + " |" for line in lines]
+    """Lines of a table in Markdown, which shows the cells as they are."""
+    cells = [map(markdown_text, line) for line in (titles, *rows)]
+    titled, *filled = ["| " + " | ".join(line) + " |" for line in cells]
+    return [titled, "| " + " | ".join(["---"] * len(titles)) + " |", *filled]
 
 
 def print_table(

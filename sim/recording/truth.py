@@ -5,14 +5,16 @@
 `calibration.toml` (the real one, in the schema of the nominal one) and `motion.npz` (the exact
 states). If boxes change before the MAV flies, these files hold what the ground robot sees;
 `surface_mav.ply` and `parts_mav.csv` hold what the MAV sees, and `changes.csv` what has changed.
-If sensors fail, `faults.csv` lists which, from when to when.
+If sensors fail, `faults.csv` lists which, from when to when. Times in these files are those of the
+motion, also where a robot's clock has stepped.
 Bodies that move are in `bodies.csv` and `body_NAME.tum`, and not in the surface.
 """
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -31,11 +33,13 @@ from airground.io.lens import Lens
 from airground.io.tum import write_tum
 from sim.geometry.box import Box
 from sim.recording.bodies_truth import BodySurfaces
+from sim.recording.faults_file import read_clocks, write_faults
 from sim.recording.row_poses import RowPoses, exact_row_poses
 from sim.recording.true_surface import TrueSurface
 from sim.robots.motion import ROBOTS, Motion, Robot
 from sim.robots.moving_bodies import MovingBody, read_bodies, write_bodies
 from sim.sensors.faults import Fault
+from sim.sensors.robot_clock import RobotClock
 
 if TYPE_CHECKING:
     from sim.geometry.changes import Change
@@ -74,12 +78,10 @@ class Truth:
         return self.T_world_camera("ground", stamp_ns)
 
     def T_world_camera(self, robot: Robot, stamp_ns: int) -> SE3:
-        """Pose of a camera at a stamp of its own clock, which runs a little off."""
-        offset_ns = self.sensors(robot).camera.time_offset_ns
-        try:
-            return self.motion.camera_pose(robot, stamp_ns + offset_ns)
-        except ValueError as error:
-            raise RecordingError(f"{self.folder}: no true pose of the {robot}: {error}") from None
+        """Pose of a camera at a stamp of its robot's clock, which may have stepped, while the
+        camera's own runs a little off."""
+        with self._posed(robot):
+            return self.motion.camera_pose(robot, self.time_ns(robot, stamp_ns))
 
     def sensors(self, robot: Robot) -> RobotTable:
         return self.calibration.mav if robot == "mav" else self.calibration.ground
@@ -90,12 +92,29 @@ class Truth:
 
     def row_poses(self, robot: Robot, stamp_ns: int) -> RowPoses:
         """`T_world_camera` of every row of the image with a stamp [ns]."""
-        middle_ns = stamp_ns + self.sensors(robot).camera.time_offset_ns
-        return exact_row_poses(self.motion, robot, self.lens(robot), middle_ns)
+        middle_ns = self.time_ns(robot, stamp_ns)
+        with self._posed(robot):
+            return exact_row_poses(self.motion, robot, self.lens(robot), middle_ns)
+
+    @contextmanager
+    def _posed(self, robot: Robot) -> Iterator[None]:
+        """RecordingError where the motion has no pose at a time."""
+        try:
+            yield
+        except ValueError as error:
+            raise RecordingError(f"{self.folder}: no true pose of the {robot}: {error}") from None
 
     def time_ns(self, robot: Robot, stamp_ns: int) -> int:
         """Time of the motion at which an image's middle row was taken [ns]."""
-        return stamp_ns + self.sensors(robot).camera.time_offset_ns
+        return self.clock(robot).time_ns(stamp_ns) + self.sensors(robot).camera.time_offset_ns
+
+    def clock(self, robot: Robot) -> RobotClock:
+        """The clock of a robot, which stamps all its samples."""
+        return self._clocks[robot]
+
+    @cached_property
+    def _clocks(self) -> dict[Robot, RobotClock]:
+        return read_clocks(self.folder)
 
     @cached_property
     def bodies(self) -> BodySurfaces:
@@ -157,8 +176,7 @@ def write_truth(
     if flight.changes:
         _mav_surface(folder).write(flight)
         _write_changes(folder / _CHANGES, flight.changes)
-    if faults:
-        _write_faults(folder / "faults.csv", faults)
+    write_faults(folder, faults)
 
 
 def _ground_surface(truth: Path) -> TrueSurface:
@@ -191,18 +209,6 @@ def _write_changes(path: Path, changes: Sequence[Change]) -> None:
         for change in changes
     ]
     _write_table(path, ["name", "change", *columns], rows)
-
-
-def _write_faults(path: Path, faults: Sequence[Fault]) -> None:
-    rows = [
-        [
-            fault.kind,
-            fault.robot,
-            *_numbers((fault.start_ns * 1e-9, fault.end_ns * 1e-9, fault.strength)),
-        ]
-        for fault in faults
-    ]
-    _write_table(path, ["kind", "robot", "start [s]", "end [s]", "size"], rows)
 
 
 def _write_table(path: Path, columns: list[str], rows: list[list[str]]) -> None:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from airground.core.messages import ImuSamples, MagneticSamples
 from airground.errors import InputError
+from sim.sensors.robot_clock import RobotClock
 
 FaultKind = Literal[
     "black",
@@ -168,8 +169,11 @@ def said_stamps(
     stamps_ns: NDArray[np.int64], faults: Sequence[Fault]
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """(N,) stamps by a clock that may have stepped [ns], and whether they lie in the recording."""
-    said = np.array(stamps_ns)
-    for fault in faults:
-        if fault.kind == "clock":
-            said[stamps_ns >= fault.start_ns] += round(fault.strength * 1e9)
+    said = clock_of(faults).stamps_ns(stamps_ns)
     return said, said <= stamps_ns[-1]
+
+
+def clock_of(faults: Iterable[Fault]) -> RobotClock:
+    """The clock of the robot with these placed faults."""
+    steps = [fault for fault in faults if fault.kind == "clock"]
+    return RobotClock.stepping((fault.start_ns, round(fault.strength * 1e9)) for fault in steps)

@@ -121,7 +121,7 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
         (["reproduce", "--out", "x", "--poses", "file"], "'slam'"),
         (["reproduce", "--out", "x", "--render", "--recordings", "y"], "--render"),
         (["reproduce", "--out", "x", "--quick", "--suite", "fast"], "--suite"),
-        (["run", "a", "--out", "x", "--set", "protocol.trials=2"], "unknown section 'protocol'"),
+        (["run", "a", "--out", "x", "--set", "protocol.trials=2"], "of: reproduce, sweep"),
         (["run", "--out", "x"], "give either RECORDING, or both --mav DIR and --ground DIR"),
         (["live", "--out", "x"], "RECORDING"),
         (["track", "no_such_folder", "--out", "x"], "no_such_folder: no such folder"),
@@ -176,16 +176,18 @@ def test_an_existing_folder_is_left_alone(
     assert (tmp_path / "mine").read_text() == "precious"
 
 
-def without_reader(script: str) -> tuple[int, bytes]:
+def without_reader(script: str, unbuffered: bool = False) -> tuple[int, bytes]:
     """Exit code and errors of a Python script whose standard output has no reader. It starts to
-    write when its standard input ends, or sooner; what it writes is kept until it ends."""
-    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    write when its standard input ends, or sooner; what it writes is kept until it ends, unless it
+    is `unbuffered`."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    environment |= {"PYTHONUNBUFFERED": "1"} if unbuffered else {}
     with subprocess.Popen(
         [sys.executable, "-c", script],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
-        env=buffered,
+        env=environment,
     ) as process:
         assert process.stdin is not None
         assert process.stdout is not None
@@ -301,6 +303,11 @@ class TestRun:
             f"sys.exit(console.run({command}))"
         )
         assert without_reader(script) == (expected, b"")
+
+    def test_output_that_is_not_kept_is_cut_off_at_once(self) -> None:
+        """As README.md says of PYTHONUNBUFFERED: help to `head -0` is no finished command."""
+        script = f"import sys; sys.stdin.read(); sys.argv[1:] = ['--help']; {RUN_CLI}"
+        assert without_reader(script, unbuffered=True) == (console.EXIT_UNREAD, b"")
 
     def test_the_pipe_of_another_process_is_no_reader(
         self,

@@ -11,7 +11,7 @@ import pytest
 
 from airground.core.cloud import Source
 from airground.core.messages import GroundImage, MavImage
-from airground.errors import RecordingError
+from airground.errors import InputError, RecordingError
 from airground.io.open_recording import layout_of, open_robot
 
 FRAMES = 4
@@ -130,5 +130,5 @@ OPTIONS = {
 def test_options_without_a_use_are_refused(tmp_path: Path, word: str) -> None:
     (tmp_path / "mav0" / "cam0").mkdir(parents=True)
     given, message = OPTIONS[word]
-    with pytest.raises(RecordingError, match=f"{word}: .*{message}"):
+    with pytest.raises(InputError, match=f"{word}: .*{message}"):
         open_robot(tmp_path, Source.MAV, **given)  # type: ignore[arg-type]

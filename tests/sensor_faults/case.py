@@ -125,7 +125,7 @@ def judged(
         return pose.stamp_ns - (ahead_ns if pose.stamp_ns >= start_ns + ahead_ns else 0)
 
     def true(pose: TrackedPose) -> SE3:
-        return truth.T_world_camera(robot, taken(pose))
+        return truth.T_world_camera(robot, pose.stamp_ns)
 
     known = [pose for pose in poses if pose.tracking is Tracking.TRACKED]
     before = [pose for pose in known if taken(pose) < start_ns]

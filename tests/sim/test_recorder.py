@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from airground.core.messages import GroundImage, MavImage
-from airground.errors import AirgroundError, InputError
+from airground.errors import AirgroundError, InputError, RecordingError
 from airground.io.digests import path_digest
 from airground.io.recording import Recording
 from airground.io.tum import read_tum
@@ -16,6 +16,7 @@ from sim.recording import frame_pool, recorder
 from sim.recording.frames import FrameMaker
 from sim.recording.recorder import image_stamps, record
 from sim.recording.truth import Truth
+from sim.robots.motion import ROBOTS
 from sim.scene import parse_scene
 from sim.sensors.presets import NOMINAL, NONE, REAL, SensorPreset
 from sim.world.world import painted
@@ -84,6 +85,16 @@ def test_the_clock_offset_moves_the_truth(nominal: Path) -> None:
     expected = truth.motion.camera_pose("mav", stamp + offset)
     np.testing.assert_array_equal(truth.T_world_mav_camera(stamp).matrix(), expected.matrix())
     assert recording.header.calibration.mav.camera.time_offset_ns == 0
+
+
+def test_outside_of_its_motion_the_truth_has_no_pose(nominal: Path) -> None:
+    truth = Truth.open(nominal)
+    for robot in ROBOTS:
+        said = rf"truth: no true pose of the {robot}: stamp -?\d+ is outside the motion \[0, 5\d+\]"
+        for ask in (truth.T_world_camera, truth.row_poses, truth.depth):
+            for stamp_ns in (-2_000_000, 5_002_000_000):
+                with pytest.raises(RecordingError, match=said):
+                    ask(robot, stamp_ns)
 
 
 def test_trajectories_are_those_of_the_motion(nominal: Path) -> None:

@@ -48,15 +48,15 @@ def inspect_dataset(path: Path, opener: Opener = open_robot) -> tuple[str, list[
         "tum", "7scenes" or "ros"), and the findings.
 
     Raises:
-        InputError: The path has no known layout.
+        InputError: The path has no known layout, or no use for an option of the opener.
     """
     if not path.exists():
         raise InputError(f"{path}: no such folder")
     layout = layout_of(path)
     if layout == "airground":
-        return layout, _ours(path)
+        return layout, _ours(path, opener)
     if path.is_dir() and (path / PLAN).exists():
-        return "dataset", _many(path)
+        return "dataset", _many(path, opener)
     match layout:
         case "euroc":
             return layout, _robot(path, Source.MAV, opener)
@@ -98,7 +98,7 @@ def _bag(path: Path, opener: Opener) -> list[Finding]:
     return [one for findings in found.values() for one in findings]
 
 
-def _many(path: Path) -> list[Finding]:
+def _many(path: Path, opener: Opener) -> list[Finding]:
     """Findings of each recording of a dataset, and whether all planned ones exist."""
     plan = read_checked(Plan, path / PLAN, "plan of a dataset")
     planned = {world.folder for world in plan.worlds}
@@ -108,11 +108,11 @@ def _many(path: Path) -> list[Finding]:
     for names, defect in ((planned - there, "is missing"), (there - planned, "was not planned")):
         findings += [Finding(n, "recording", defect, Verdict.WRONG) for n in sorted(names)]
     for name in sorted(there & planned):
-        findings += [under(name, one) for one in _ours(path / name)]
+        findings += [under(name, one) for one in _ours(path / name, opener)]
     return findings
 
 
-def _ours(path: Path) -> list[Finding]:
+def _ours(path: Path, opener: Opener) -> list[Finding]:
     try:
         recording = RecordingFolder.open(path)
     except RecordingError as error:
@@ -127,7 +127,7 @@ def _ours(path: Path) -> list[Finding]:
         findings.append(Finding("", "digests", f"all {count} are right"))
     return [
         *findings,
-        *(one for robot in recording.robots for one in _robot(path, robot, open_robot)),
+        *(one for robot in recording.robots for one in _robot(path, robot, opener)),
     ]
 
 

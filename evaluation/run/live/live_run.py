@@ -208,7 +208,7 @@ class LiveTracking(AbstractContextManager["LiveTracking"]):
             log.late_ns[robot] = self._streams[robot].late_ns
             name, malformed = robot.name.lower(), self._streams[robot].malformed
             if malformed:
-                logger.warning("%s: %d messages were malformed and were dropped", name, malformed)
+                logger.warning("%s: dropped messages that were malformed: %d", name, malformed)
             answers, final = (report.log, report.final) if report else (FrontEndLog(), None)
             tracked[name] = Tracked(name, answers, final, name in self._setup.slam_robots())
         return TrackingReport(tracked, self._streams[Source.GROUND].final)

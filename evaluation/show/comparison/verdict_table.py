@@ -9,7 +9,7 @@ from rich.console import Console
 
 from evaluation.judge.metrics import Metric
 from evaluation.judge.verdict import ALPHA, MOVED, Comparison, Judged, Verdict
-from evaluation.setup.text import MISSING, TextTable, print_table
+from evaluation.setup.text import MISSING, TextTable, markdown_text, print_table
 
 HEADER = ("metric", "accepted", "now", "change", "95 % interval", "p", "compared", "verdict")
 NARROW = ("metric", "accepted", "now", "change", "verdict")
@@ -94,14 +94,14 @@ def markdown(comparison: Comparison) -> str:
     """The table for a pull request: changes first, the rest folded."""
     moved = [judged for verdict in MOVED for judged in comparison.of(verdict)]
     rest = [judged for judged in comparison.judged if judged not in moved]
-    lines = [f"**airground check: {_escaped(conclusion(comparison))}**", ""]
+    lines = [f"**airground check: {markdown_text(conclusion(comparison))}**", ""]
     if moved:
         lines += [*_markdown_table(moved), ""]
     if rest:
         summary = "No difference seen, no verdict possible, or not measured"
         lines += [f"<details><summary>{summary}</summary>", "", *_markdown_table(rest), ""]
         lines += ["</details>", ""]
-    return "\n".join([*lines, _escaped(conditions(comparison)), ""])
+    return "\n".join([*lines, markdown_text(conditions(comparison)), ""])
 
 
 def junit(comparison: Comparison) -> str:
@@ -140,14 +140,8 @@ def _case(judged: Judged) -> ElementTree.Element:
 def _markdown_table(rows: list[Judged]) -> list[str]:
     lines = [cells(judged) for judged in rows]
     rule = ("---", *("---:" for _ in HEADER[1:-1]), "---")
-    table = [HEADER, rule, *(tuple(map(_escaped, line)) for line in lines)]
+    table = [HEADER, rule, *(tuple(map(markdown_text, line)) for line in lines)]
     return [f"| {' | '.join(line)} |" for line in table]
-
-
-def _escaped(text: str) -> str:
-    for special in ("\\", "|", "*", "_", "<"):
-        text = text.replace(special, f"\\{special}")
-    return text
 
 
 def _taken_as_independent(judged: Judged) -> bool:

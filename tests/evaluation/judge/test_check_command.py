@@ -224,6 +224,7 @@ def test_accepting_without_a_reason_changes_nothing(
         ("--quick", "--suite and --quick are not allowed together"),
         ("--set protocol.trials=3", "the suite fast is fixed"),
         ("--scenes tiny", "the suite fast is fixed"),
+        ("--alone", "--alone: the suite fast has one setup anyway"),
     ],
 )
 def test_the_suite_is_fixed(

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import cv2
@@ -17,16 +17,20 @@ import numpy as np
 import pytest
 
 from airground.config import Config, GroundMapping
+from airground.core.cloud import Source
 from airground.core.se3 import SE3
 from airground.io.header import write_toml
 from airground.io.recording import Recording
+from airground.link.channel import Sender
+from airground.tracking import TrackedFrame
 from evaluation.judge.live_summary import LiveSummary, live_summary
 from evaluation.run.claim_log import ClaimLog
 from evaluation.run.drops import nothing_dropped
 from evaluation.run.live import live_run
+from evaluation.run.live.arrivals import Stream, in_order
 from evaluation.run.live.live_run import run_live
-from evaluation.run.live.playback import Playback
-from evaluation.run.live.radio_link import RadioLimits
+from evaluation.run.live.playback import Playback, PlaybackClock
+from evaluation.run.live.radio_link import Envelope, RadioLimits
 from evaluation.run.onlooker import Seen
 from evaluation.run.recording import RunResult, run_recording
 from evaluation.setup import console
@@ -90,6 +94,31 @@ def test_a_live_run_with_drops_is_reproduced_offline(recording: Recording) -> No
     assert summary.mav.lost == len(drops.unmapped.mav) == 4 - summary.mav.dropped
     assert summary.mav.mapped_ms.n == 0
     assert_same(live, run_recording(recording, truth, SETUP, 0, drops))
+
+
+def test_forged_messages_are_dropped_and_counted_at_the_end(
+    recording: Recording, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """They change nothing else: each robot's own messages all arrive."""
+
+    def with_forged(
+        streams: Mapping[Source, Stream], clock: PlaybackClock, patience_s: float
+    ) -> Iterator[TrackedFrame]:
+        for message in ([b"xy"], Envelope(False, 0, 0).around([b"no frame"])):
+            forger = Sender(streams[Source.GROUND]._receiver.address, capacity=1)
+            forger.send(message)
+            forger.close()
+        return in_order(streams, clock, patience_s)
+
+    monkeypatch.setattr(live_run, "in_order", with_forged)
+    playback = Playback(rate=1000.0, waiting_frames=100, patience_s=PATIENCE_S)
+    with caplog.at_level("WARNING"):
+        live, drops = run_live(recording, Truth.open(recording.path), SETUP, 0, playback)
+    assert [one.getMessage() for one in caplog.records if "malformed" in one.getMessage()] == [
+        "ground: dropped messages that were malformed: 2"
+    ]
+    assert drops == nothing_dropped(recording)
+    assert summarized(live).ground.mapped_ms.n == 4
 
 
 def test_claims_of_a_live_run_count_from_when_they_were_computed(

@@ -249,6 +249,31 @@ def test_the_inset_shows_the_particles_where_they_are_wrong(lost: Showcase) -> N
     assert ((x > left) & (x < right) & (y > bottom) & (y < top)).all()
 
 
+@pytest.mark.parametrize("sigmas_m", [(20.0, 10.0), (0.01, 500.0)])
+def test_a_very_large_ellipse_is_in_its_picture_and_not_cut(
+    lost: Showcase, sigmas_m: tuple[float, float], tmp_path: Path
+) -> None:
+    """Also where the particles are close together, so that an inset has only a part of it."""
+    turn = np.array([[0.8, -0.6], [0.6, 0.8]])
+    wide = turn @ np.diag(np.square(sigmas_m)) @ turn.T
+    steps = tuple(
+        dataclasses.replace(step, belief=dataclasses.replace(step.belief, covariance=wide))
+        for step in lost.steps
+    )
+    figure = particles_figure(steps)
+    save_picture(figure, tmp_path, "particles")
+    assert overhang_in(figure) < CUT_IN
+    for panel, step in zip(figure.axes, steps, strict=True):
+        assert len(panel.child_axes) == 1
+        outline = ellipse_points(step.belief.estimate[:2], wide)
+        assert np.ptp(outline, axis=0).max() > 2 * max(sigmas_m)
+        (left, right), (bottom, top) = panel.get_xlim(), panel.get_ylim()
+        assert ((outline > (left, bottom)) & (outline < (right, top))).all()
+        place = panel.get_window_extent()
+        assert place.contains(*panel.transData.transform(outline).T.min(axis=1))
+        assert place.contains(*panel.transData.transform(outline).T.max(axis=1))
+
+
 def test_without_an_alignment_the_surface_stands_where_it_was_believed(lost: Showcase) -> None:
     shown = as_believed(lost)
     assert len(shown.aerial_cloud) == len(lost.surface.cloud_mav)
