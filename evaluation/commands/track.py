@@ -45,7 +45,12 @@ class Track(FolderOptions, ConfigOptions, SeedOption, OutOption, Verb):
     """poses for the front end file: TUM, of the camera, metric, z up"""
 
     def main(self) -> None:
-        from evaluation.run.own_recordings import print_alone, run_alone, write_alone
+        from evaluation.run.own_recordings import (
+            print_alone,
+            run_alone,
+            warn_of_silence,
+            write_alone,
+        )
         from evaluation.setup.output import fresh_folder
         from evaluation.setup.progress import announce
         from evaluation.show.figures.front_ends import draw_front_ends
@@ -72,6 +77,7 @@ class Track(FolderOptions, ConfigOptions, SeedOption, OutOption, Verb):
                 draw_front_ends(out, recording, results, true_pose)
         for summary in summaries:
             print_alone(summary)
+        warn_of_silence(recording)
 
     def _names(self) -> list[str]:
         """The front ends, each once; a trajectory asks for the front end that follows it."""
