@@ -75,6 +75,7 @@ class Live(PlaybackOptions, RadioOptions, PipelineOptions, SeedOption, OutOption
 
     def main(self) -> None:
         from evaluation.run.live.live_run import run_live
+        from evaluation.run.own_recordings import warn_of_silence
         from evaluation.setup.output import fresh_folder
         from evaluation.setup.progress import announce
         from evaluation.show.report.screen import print_summary
@@ -89,6 +90,7 @@ class Live(PlaybackOptions, RadioOptions, PipelineOptions, SeedOption, OutOption
             result, drops = run_live(recording, truth, setup, seed, playback)
             summary = write_measured(folder, recording, result, drops, setup, seed)
         print_summary(summary)
+        warn_of_silence(recording.mav, recording.ground)
 
     def playback(self) -> Playback:
         """How the recording is to be played.

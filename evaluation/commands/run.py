@@ -170,6 +170,7 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
     def _run_simulated(self, path: Path) -> None:
         from evaluation.measure.close_up import CloseUp
         from evaluation.run.drops import DropList, nothing_dropped
+        from evaluation.run.own_recordings import warn_of_silence
         from evaluation.run.recording import run_recording
         from evaluation.setup.output import fresh_folder
         from evaluation.setup.progress import announce
@@ -195,10 +196,12 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
             )
             summary = write_measured(folder, recording, result, drops, setup, seed, showcase)
         print_summary(summary)
+        warn_of_silence(recording.mav, recording.ground)
 
     def _run_pair(self, opened: Callable[[], Pair], name: str) -> None:
         """Run without truth over what `opened` gives, once the output folder is made."""
         from evaluation.run.own_pair import print_pair, run_pair, write_pair
+        from evaluation.run.own_recordings import warn_of_silence
         from evaluation.setup.output import fresh_folder
         from evaluation.setup.progress import announce
         from evaluation.setup.settings import write_config
@@ -219,6 +222,7 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
             write_config(setup.config, folder / "config.toml")
             write_pair_page(folder, name, summary, result)
         print_pair(summary)
+        warn_of_silence(pair.mav, pair.ground)
 
     def _setup_with(self, variant: str) -> Setup:
         """The setup with the given results, which its variant names."""

@@ -56,7 +56,12 @@ class Track(FolderOptions, ConfigOptions, SeedOption, OutOption, Verb):
         return "" if section == mine else f"the SLAM of this robot uses section {mine}"
 
     def main(self) -> None:
-        from evaluation.run.own_recordings import print_alone, run_alone, write_alone
+        from evaluation.run.own_recordings import (
+            print_alone,
+            run_alone,
+            warn_of_silence,
+            write_alone,
+        )
         from evaluation.setup.output import fresh_folder
         from evaluation.setup.progress import announce
         from evaluation.show.figures.front_ends import draw_front_ends
@@ -84,6 +89,7 @@ class Track(FolderOptions, ConfigOptions, SeedOption, OutOption, Verb):
                 draw_front_ends(out, recording, results, true_pose)
         for summary in summaries:
             print_alone(summary)
+        warn_of_silence(recording)
 
     def _check_used(self, names: list[str], robot: Source) -> None:
         """InputError if an option would change nothing."""

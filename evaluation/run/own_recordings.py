@@ -6,6 +6,7 @@ The truth is optional: errors are stated for the images whose true pose is known
 from __future__ import annotations
 
 import json
+import logging
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +17,7 @@ import numpy as np
 from airground.core.messages import GroundImage, ImuSamples, MavImage
 from airground.core.trajectory import Trajectory
 from airground.io.robot_recording import RobotRecording
+from airground.io.silence import silence_note
 from airground.slam.front_end import FrontEnd
 from evaluation.run.tracking import live_path, write_paths
 from evaluation.setup.checked_json import number
@@ -24,6 +26,8 @@ from evaluation.setup.text import TextTable, metres, percent, print_table, secon
 from evaluation.table.tracked_share import TruePose, tracked_share_of
 from evaluation.table.tracking_log import FrontEndLog, WatchedFrontEnd
 from evaluation.table.trajectory_error import trajectory_error
+
+logger = logging.getLogger(__name__)
 
 WELL_KNOWN_SCALE, LIKELY_SCALE = 0.02, 0.5
 """Standard deviation of a scale up to which nothing is said of it, and from which on the poses are
@@ -149,6 +153,13 @@ def print_alone(summary: dict[str, Any]) -> None:
     print_table(TextTable(("", "here"), tuple(rows)), title, caption, bold=(1,))
 
 
+def warn_of_silence(*recordings: RobotRecording[Any]) -> None:
+    """Log a warning for each robot whose sensors are all silent for a while."""
+    for recording in recordings:
+        if note := silence_note(recording):
+            logger.warning("%s: %s", recording.robot.name.lower(), note)
+
+
 def robot_summary(
     folder: Path,
     name: str,
@@ -170,6 +181,7 @@ def robot_summary(
         "lost_images": share.lost_images,
         "final_images": 0 if final is None else len(final),
         "scale_note": scale_note(recording, log, final) or None,
+        "silence_note": silence_note(recording) or None,
         "error": {"final": _error(true_pose, final), "live": _error(true_pose, live_path(log))},
     }
 

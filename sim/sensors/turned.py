@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from airground.errors import InputError
+from sim.robots.motion import Robot
 from sim.sensors.auto_exposure import CONSUMER_EXPOSURE
-from sim.sensors.faults import Fault
+from sim.sensors.faults import GROUND_ONLY, Fault, FaultKind
 from sim.sensors.presets import CAMERA_RATE_HZ, SensorPreset
 from sim.sensors.sensor_errors import MagneticNoise
 from sim.world.magnetic_field import EARTH_FIELD_WORLD
@@ -91,25 +92,19 @@ def with_gamma(preset: SensorPreset, gamma: float) -> SensorPreset:
     return replace(preset, image=replace(preset.image, gamma=gamma))
 
 
-def with_dropped(preset: SensorPreset, seconds: float) -> SensorPreset:
-    """The preset with cameras that both drop their images for so long [s], each at a time drawn by
-    the seed."""
-    return _with_faults(
-        preset, Fault("dropped", "mav", seconds), Fault("dropped", "ground", seconds)
-    )
-
-
-def with_imu_gap(preset: SensorPreset, seconds: float) -> SensorPreset:
-    """The preset with IMUs that both miss their samples for so long [s], each at a time drawn by
-    the seed."""
-    return _with_faults(
-        preset, Fault("imu_gap", "mav", seconds), Fault("imu_gap", "ground", seconds)
-    )
-
-
-def _with_faults(preset: SensorPreset, *faults: Fault) -> SensorPreset:
-    lasting = tuple(fault for fault in faults if fault.duration_s > 0)
+def with_fault(preset: SensorPreset, kind: FaultKind, seconds: float) -> SensorPreset:
+    """The preset with a fault of each robot that can have it, for so long [s], each at a time drawn
+    by the seed; the preset itself for 0 s."""
+    robots: tuple[Robot, ...] = ("ground",) if kind in GROUND_ONLY else ("mav", "ground")
+    lasting = [Fault(kind, robot, seconds) for robot in robots if seconds > 0]
     return replace(preset, faults=(*preset.faults, *lasting))
+
+
+def with_clock_step(preset: SensorPreset, seconds: float) -> SensorPreset:
+    """The preset with a clock of the MAV that jumps ahead by so much [s], at a time drawn by the
+    seed; the preset itself for 0 s."""
+    step = [Fault("clock", "mav", 0.0, size=seconds)] if seconds > 0 else []
+    return replace(preset, faults=(*preset.faults, *step))
 
 
 def with_fisheye(preset: SensorPreset, factor: float) -> SensorPreset:

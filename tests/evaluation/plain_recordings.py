@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,21 @@ from airground.io.tum import format_stamp, write_tum
 from tests.slam.synthetic_world import IMU_HZ, IMU_NOISE, Sequence
 
 DEPTH_UNITS_PER_M = 5000
+
+
+def stepped(sequence: Sequence, index: int, step_ns: int) -> Sequence:
+    """The sequence of a robot whose clock steps ahead before an image."""
+    at_ns = sequence.images[index].stamp_ns - 1
+
+    def said(stamp_ns: Any) -> Any:
+        return stamp_ns + step_ns * (stamp_ns > at_ns)
+
+    images = tuple(replace(image, stamp_ns=said(image.stamp_ns)) for image in sequence.images)
+    imu, truth = sequence.imu, sequence.T_world_camera
+    stamps = [image.stamp_ns for image in images]
+    poses = Trajectory.from_poses(stamps, [truth[k] for k in range(len(truth))])
+    late = replace(imu, stamps_ns=said(imu.stamps_ns))
+    return replace(sequence, images=images, imu=late, T_world_camera=poses)
 
 
 def write_tum_folder(root: Path, sequence: Sequence) -> Path:

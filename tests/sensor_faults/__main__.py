@@ -13,11 +13,10 @@ import numpy as np
 
 from airground.io.recording import Recording
 from sim.recording.recorder import Flight, record
-from sim.recording.truth import Truth
 from sim.scene import load_scene
 from sim.sensors.faults import GROUND_ONLY, Fault, placed
 from sim.sensors.presets import NOMINAL
-from tests.sensor_faults.case import Outcome, drawn, outcome, stored
+from tests.sensor_faults.case import Outcome, drawn, outcome, outcome_in, unseen
 
 SCENE, SEED = "tiny", 0
 LASTING: dict[str, tuple[float, ...]] = {
@@ -47,7 +46,9 @@ HEADINGS = (
     "step [cm]",
     "step [sigma]",
     "off [cm]",
+    "off [deg]",
     "silently wrong [s]",
+    "posed though unseen",
     "traceback",
 )
 
@@ -92,8 +93,8 @@ def outcome_of(recording: Recording, faults: Sequence[Fault]) -> Outcome:
     if faults[0].kind == "carried":
         failing = replace(NOMINAL, faults=tuple(faults))
         with drawn(Flight(load_scene(SCENE), SEED, 0, failing)) as (part, truth):
-            return outcome(part, truth, faults)
-    return outcome(stored(recording, faults), Truth.open(recording.path), faults)
+            return outcome(part, truth, faults, unseen(part.camera_stamps, faults))
+    return outcome_in(recording, faults)
 
 
 def _row(kind: str, duration_s: float, robot: str, outcomes: list[Outcome]) -> str:
@@ -110,7 +111,9 @@ def _row(kind: str, duration_s: float, robot: str, outcomes: list[Outcome]) -> s
         f"{1e2 * most('step_m'):.1f}",
         f"{most('step_sigmas'):.1f}",
         f"{1e2 * most('off_m'):.1f}",
+        f"{most('off_deg'):.2f}",
         f"{most('silent_s'):.2f}",
+        f"{sum(one.blind for one in outcomes)}",
         next((one.error for one in outcomes if one.error), "none"),
     ]
     return f"| {' | '.join(cells)} |"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from airground.config import Config
 from airground.core.cloud import Source
@@ -39,8 +40,9 @@ class Outcome:
         again_s: Time from the last fault's end to the first pose after it [s]; NaN without one.
         step_m, step_sigmas: Largest change of the error from pose to pose [m], and the largest by
             the stated deviation of the later one.
-        off_m: Largest growth of the error of a pose that was given out [m].
+        off_m, off_deg: Largest growth of the error of a pose that was given out [m, deg].
         silent_s: Longest time for which poses were silently wrong [s].
+        blind: Images that show nothing new and have a pose all the same.
         error: Last line of a traceback; empty without one.
     """
 
@@ -50,13 +52,15 @@ class Outcome:
     step_m: float
     step_sigmas: float
     off_m: float
+    off_deg: float
     silent_s: float
+    blind: int
     error: str = ""
 
 
 def stored(recording: Recording, faults: Sequence[Fault]) -> RobotRecording[Any]:
     """The faulty robot's part of a recording that was made without faults."""
-    part: Any = recording.mav if faults[0].robot == "mav" else recording.ground
+    part: Any = recording.of(Source[faults[0].robot.upper()])
     frames = FaultyFrames.of(part.camera_stamps, faults)
 
     def read(index: int) -> MavImage | GroundImage:
@@ -69,6 +73,19 @@ def stored(recording: Recording, faults: Sequence[Fault]) -> RobotRecording[Any]
     imu = faulty_imu(part.imu, faults)
     stamps = frames.stamps_ns
     return replace(part, camera_stamps=stamps, imu=imu, magnetic=None, read_image=read)
+
+
+def unseen(camera_stamps: NDArray[np.int64], faults: Sequence[Fault]) -> frozenset[int]:
+    """Stamps [ns] of the images that show nothing new: black ones, and those equal to the one
+    before.
+
+    Args:
+        camera_stamps: (N,) stamps of the images without faults [ns].
+        faults: Faults of that robot, placed.
+    """
+    frames = FaultyFrames.of(camera_stamps, faults)
+    repeats = np.diff(frames.taken, prepend=-1) == 0
+    return frozenset(frames.stamps_ns[repeats | (frames.gain == 0)].tolist())
 
 
 @contextmanager
@@ -95,18 +112,32 @@ def tracked(part: RobotRecording[Any], until_ns: int, seed: int = 0) -> list[Tra
     return poses
 
 
-def outcome(part: RobotRecording[Any], truth: Truth, faults: Sequence[Fault]) -> Outcome:
-    """Track a robot through its faults and hold its poses against the truth."""
+def outcome(
+    part: RobotRecording[Any],
+    truth: Truth,
+    faults: Sequence[Fault],
+    dark: Collection[int],
+    after_s: float = AFTER_S,
+) -> Outcome:
+    """Track a robot through its faults, and for `after_s` on, and hold its poses against the truth;
+    `dark` are stamps of images that show nothing new (`unseen`) [ns]."""
     ahead_ns = sum(round(fault.strength * 1e9) for fault in faults if fault.kind == "clock")
     start_ns = min(fault.start_ns for fault in faults)
     end_ns = max(fault.end_ns for fault in faults)
     try:
-        poses = tracked(part, end_ns + ahead_ns + round(AFTER_S * 1e9))
+        poses = tracked(part, end_ns + ahead_ns + round(after_s * 1e9))
     except Exception as error:  # what it is, is the result
         place = traceback.extract_tb(error.__traceback__)[-1]
         said = f"{type(error).__name__} at {Path(place.filename).name}:{place.lineno}"
-        return Outcome(0, 0, np.nan, np.nan, np.nan, np.nan, np.nan, said)
-    return judged(poses, truth, faults[0].robot, start_ns, end_ns, ahead_ns)
+        return Outcome(0, 0, *6 * [np.nan], 0, said)
+    return judged(poses, truth, faults[0].robot, start_ns, end_ns, ahead_ns, dark)
+
+
+def outcome_in(recording: Recording, faults: Sequence[Fault], after_s: float = AFTER_S) -> Outcome:
+    """The outcome of faults of one robot in a recording that was made without faults."""
+    camera_stamps = recording.of(Source[faults[0].robot.upper()]).camera_stamps
+    part, truth = stored(recording, faults), Truth.open(recording.path)
+    return outcome(part, truth, faults, unseen(camera_stamps, faults), after_s)
 
 
 def judged(
@@ -116,6 +147,7 @@ def judged(
     start_ns: int,
     end_ns: int,
     ahead_ns: int,
+    dark: Collection[int] = (),
 ) -> Outcome:
     """Hold poses against the truth, from the start to the end of the faults and on.
 
@@ -134,12 +166,14 @@ def judged(
     assert before[-1].T_map_camera is not None
     T_map_world = before[-1].T_map_camera @ true(before[-1]).inverse()
     last = np.zeros(3)
-    step, sigmas, off, silent_s, silent_since = 0.0, 0.0, 0.0, 0.0, None
+    step, sigmas, off, off_rad, silent_s, silent_since = 0.0, 0.0, 0.0, 0.0, 0.0, None
     for pose in after:
         if pose.T_map_camera is None:
             silent_since = None
             continue
-        error = pose.T_map_camera.translation - (T_map_world @ true(pose)).translation
+        T_map_true = T_map_world @ true(pose)
+        error = pose.T_map_camera.translation - T_map_true.translation
+        off_rad = max(off_rad, (T_map_true.inverse() @ pose.T_map_camera).angle())
         sigma = np.inf if pose.covariance is None else np.sqrt(np.trace(pose.covariance[:3, :3]))
         change = float(np.linalg.norm(error - last))
         step, sigmas = max(step, change), max(sigmas, change / sigma)
@@ -150,8 +184,10 @@ def judged(
             silent_s = max(silent_s, (pose.stamp_ns - silent_since) * 1e-9 + 1 / 30)
         else:
             silent_since = None
-    again = [taken(pose) for pose in after if pose.T_map_camera is not None]
-    again = [stamp for stamp in again if stamp >= end_ns]
+    given = [pose for pose in after if pose.T_map_camera is not None]
+    again = [taken(pose) for pose in given if taken(pose) >= end_ns]
     again_s = (again[0] - end_ns) * 1e-9 if again else np.nan
-    lost = sum(pose.T_map_camera is None for pose in after)
-    return Outcome(len(after), lost, again_s, step, sigmas, off, silent_s)
+    lost = len(after) - len(given)
+    blind = sum(pose.stamp_ns in dark for pose in given)
+    off_deg = float(np.degrees(off_rad))
+    return Outcome(len(after), lost, again_s, step, sigmas, off, off_deg, silent_s, blind)

@@ -26,7 +26,7 @@ from sim.sensors.faults import (
 )
 from sim.sensors.faulty_frames import FaultyFrames
 from sim.sensors.presets import NOMINAL
-from sim.sensors.turned import with_dropped, with_imu_gap
+from sim.sensors.turned import with_clock_step, with_fault
 from sim.world.world import build_world
 from tests.sim.small_flight import SCENE, few_stamps, unpainted
 
@@ -203,13 +203,15 @@ def test_faults_must_leave_an_image(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
-def test_dials_add_a_fault_of_both_robots() -> None:
-    assert with_dropped(NOMINAL, 0.0) == NOMINAL
-    both = with_imu_gap(with_dropped(NOMINAL, 2.0), 0.5)
-    named = [(one.kind, one.robot, one.duration_s) for one in both.faults]
+def test_dials_add_a_fault_of_each_robot_that_can_have_it() -> None:
+    assert with_fault(NOMINAL, "dropped", 0.0) == with_clock_step(NOMINAL, 0.0) == NOMINAL
+    every = with_fault(with_fault(NOMINAL, "dropped", 2.0), "depth_gone", 0.5)
+    every = with_clock_step(every, 0.4)
+    named = [(one.kind, one.robot, one.duration_s, one.strength) for one in every.faults]
     assert named == [
-        ("dropped", "mav", 2.0),
-        ("dropped", "ground", 2.0),
-        ("imu_gap", "mav", 0.5),
-        ("imu_gap", "ground", 0.5),
+        ("dropped", "mav", 2.0, 0.0),
+        ("dropped", "ground", 2.0, 0.0),
+        ("depth_gone", "ground", 0.5, 0.0),
+        ("clock", "mav", 0.0, 0.4),
     ]
+    assert {one.start_s for one in every.faults} == {None}

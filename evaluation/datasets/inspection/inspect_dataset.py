@@ -16,6 +16,7 @@ from airground.io.layout import HEADER
 from airground.io.open_recording import layout_of, open_robot, unknown_layout
 from airground.io.recording_folder import RecordingFolder
 from airground.io.robot_recording import RobotRecording
+from airground.io.silence import silence_note
 from evaluation.datasets.inspection.exposure import look_at_exposure
 from evaluation.datasets.inspection.findings import Finding, Verdict, look_at_stamps
 from evaluation.datasets.inspection.truth_against_images import (
@@ -164,6 +165,8 @@ def _samples(part: str, recording: RobotRecording) -> list[Finding]:
             findings.append(Finding(part, subject, "none", Verdict.NOTED))
         else:
             findings.append(look_at_stamps(part, subject, samples.stamps_ns))
+    if note := silence_note(recording):
+        findings.append(Finding(part, "clock", note, Verdict.WRONG))
     return findings
 
 

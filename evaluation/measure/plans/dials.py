@@ -11,16 +11,17 @@ from airground.errors import InputError
 from evaluation.setup.settings import with_value
 from sim.appearance.other_light import later_light, light_between
 from sim.scene import MAX_HEAP_HEIGHT_M, Light, Scene
+from sim.sensors.faults import FaultKind
 from sim.sensors.presets import SensorPreset
 from sim.sensors.turned import (
     with_auto_exposure,
+    with_clock_step,
     with_depth_camera,
     with_distortion,
-    with_dropped,
+    with_fault,
     with_fisheye,
     with_gamma,
     with_heading_error,
-    with_imu_gap,
     with_noise,
     with_rate,
     with_readout,
@@ -57,6 +58,18 @@ class Dial:
     high: float
     does: str
     turn: Callable[[Subject, float], Subject]
+
+
+def _failing(name: str, kind: FaultKind, does: str) -> Dial:
+    """A dial for how long a sensor fails."""
+    return Dial(
+        f"sensors.{name}",
+        "s",
+        0.0,
+        5.0,
+        f"time for which {does}, once, at a time drawn by the seed",
+        lambda subject, value: replace(subject, sensors=with_fault(subject.sensors, kind, value)),
+    )
 
 
 DIALS = (
@@ -178,15 +191,18 @@ DIALS = (
         "rate of both cameras' images: 30, or that divided by a whole number",
         lambda subject, value: replace(subject, sensors=with_rate(subject.sensors, value)),
     ),
+    _failing("dropped_s", "dropped", "each robot's camera drops its images"),
+    _failing("black_s", "black", "each robot's camera gives black images"),
+    _failing("frozen_s", "frozen", "each robot's camera repeats its last image with new stamps"),
+    _failing("overexposed_s", "exposure", "light is four times as bright for each robot's camera"),
+    _failing("depth_gone_s", "depth_gone", "the ground robot's depth images have no depth"),
+    _failing("imu_gap_s", "imu_gap", "each robot's IMU misses its samples"),
+    _failing("imu_saturated_s", "imu_saturated", "each robot's IMU reads full scale on all axes"),
+    _failing("imu_silent_s", "imu_silent", "each robot's IMU reads zero on all axes"),
     Dial(
-        "sensors.dropped_s", "s", 0.0, 5.0,
-        "time for which each robot's camera drops its images, once, at a time drawn by the seed",
-        lambda subject, value: replace(subject, sensors=with_dropped(subject.sensors, value)),
-    ),
-    Dial(
-        "sensors.imu_gap_s", "s", 0.0, 5.0,
-        "time for which each robot's IMU misses its samples, once, at a time drawn by the seed",
-        lambda subject, value: replace(subject, sensors=with_imu_gap(subject.sensors, value)),
+        "sensors.clock_step_s", "s", 0.0, 5.0,
+        "time by which all later stamps of the MAV jump ahead, once, at a time drawn by the seed",
+        lambda subject, value: replace(subject, sensors=with_clock_step(subject.sensors, value)),
     ),
     Dial(
         "sensors.fisheye", "", 0.0, 1.5,

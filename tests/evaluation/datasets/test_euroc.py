@@ -19,7 +19,7 @@ from sim.recording import recorder
 from sim.recording.recorder import record
 from sim.scene import parse_scene
 from sim.sensors.presets import NOMINAL
-from sim.sensors.turned import with_imu_gap
+from sim.sensors.turned import with_fault
 from tests.evaluation.conftest import images_in_flight
 from tests.sim.small_flight import SCENE
 
@@ -145,7 +145,7 @@ def test_an_imu_that_was_silent_leaves_the_truth_whole(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(recorder, "image_stamps", images_in_flight)
         scene = parse_scene(SCENE, "small.toml")
-        path = record(scene, 3, with_imu_gap(NOMINAL, 0.3), tmp_path / "silent", workers=1)
+        path = record(scene, 3, with_fault(NOMINAL, "imu_gap", 0.3), tmp_path / "silent", workers=1)
     silent = Simulated.open(path)
     samples, _ = silent.samples("mav")
     assert len(simulated.truth.motion.stamps_ns) - len(samples.stamps_ns) == 60

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -222,6 +224,31 @@ def test_missing_images_are_counted(tum: Path) -> None:
     assert found.verdict is Verdict.NOTED
     assert "18 at 30.0 Hz" in found.found
     assert "3 missing, longest gap 0.133 s" in found.found
+
+
+@pytest.mark.usefixtures("_images_unseen")
+def test_a_clock_that_steps_is_found(exported: Exported) -> None:
+    """All streams have the same gap; with one of them alone, only that is wrong."""
+    folder = exported("euroc") / "mav0"
+
+    def opener(path: Path, robot: Source, of_images: bool) -> RobotRecording:
+        whole = open_robot(path, robot)
+        assert whole.imu is not None
+        at_ns = int(whole.camera_stamps[10])
+
+        def said(stamps: np.ndarray) -> np.ndarray:
+            return np.where(stamps > at_ns, stamps + 400_000_000, stamps)
+
+        imu = replace(whole.imu, stamps_ns=said(whole.imu.stamps_ns))
+        stamps = said(whole.camera_stamps) if of_images else whole.camera_stamps
+        return replace(whole, imu=imu, magnetic=None, camera_stamps=stamps)
+
+    for of_images in (True, False):
+        _, findings = inspect_dataset(folder, partial(opener, of_images=of_images))
+        assert of(findings, "mav", "IMU").verdict is Verdict.WRONG
+        clock = [one.found for one in findings if one.subject == "clock"]
+        assert len(clock) == of_images
+        assert all("all sensors are silent from 0.33 to 0.7" in found for found in clock)
 
 
 def test_a_long_gap_is_wrong() -> None:

@@ -123,6 +123,13 @@ def test_dials_turn_what_they_name() -> None:
         "sensors.camera_hz": 15.0,
         "sensors.dropped_s": 2.0,
         "sensors.imu_gap_s": 0.5,
+        "sensors.black_s": 0.1,
+        "sensors.frozen_s": 0.2,
+        "sensors.overexposed_s": 0.3,
+        "sensors.depth_gone_s": 0.4,
+        "sensors.imu_saturated_s": 0.6,
+        "sensors.imu_silent_s": 0.7,
+        "sensors.clock_step_s": 0.8,
         "sensors.heading_error_deg": 5.0,
         "height_maps.cells_per_m": 50.0,
     }
@@ -148,8 +155,14 @@ def test_dials_turn_what_they_name() -> None:
     assert {(o.lens, o.distortion, o.readout_s) for o in optics} == {("equidistant", 0.9, 0.02)}
     assert (subject.sensors.depth_baseline_m, subject.sensors.depth_registered) == (0.05, False)
     assert subject.sensors.every == 2
-    faults = [(fault.kind, fault.duration_s) for fault in subject.sensors.faults]
-    assert faults == 2 * [("dropped", 2.0)] + 2 * [("imu_gap", 0.5)]
+    faults = {(one.kind, one.robot): one.duration_s for one in subject.sensors.faults}
+    both = {"dropped": 2.0, "imu_gap": 0.5, "black": 0.1, "frozen": 0.2, "exposure": 0.3}
+    both |= {"imu_saturated": 0.6, "imu_silent": 0.7}
+    each = {(kind, robot): lasts for kind, lasts in both.items() for robot in ("mav", "ground")}
+    assert faults == each | {("depth_gone", "ground"): 0.4, ("clock", "mav"): 0.0}
+    (clock,) = [one for one in subject.sensors.faults if one.kind == "clock"]
+    assert clock.size == 0.8
+    assert len(subject.sensors.faults) == len(faults)
     # What is turned is still a valid scene.
     assert type(scene).model_validate(scene.model_dump()) == scene
 

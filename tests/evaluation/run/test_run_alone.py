@@ -24,7 +24,7 @@ from evaluation.run.own_recordings import WELL_KNOWN_SCALE, scale_note
 from evaluation.setup import console
 from evaluation.table.tracking_log import FrontEndLog
 from evaluation.table.true_camera import read_euroc_poses
-from tests.evaluation.plain_recordings import write_euroc_folder, write_tum_folder
+from tests.evaluation.plain_recordings import stepped, write_euroc_folder, write_tum_folder
 from tests.slam.synthetic_world import ground_sequence, mav_sequence
 
 FRAMES = 15
@@ -66,6 +66,26 @@ def test_a_tum_folder_is_tracked_and_measured(tum: Path, tmp_path: Path) -> None
         path = file_interface.read_tum_trajectory_file(str(out / f"{name}.tum"))
         stamps = [image.stamp_ns / 1e9 for image in ground_sequence(FRAMES).images]
         np.testing.assert_allclose(path.timestamps, stamps)
+
+
+def test_a_clock_that_steps_is_in_the_summary_and_on_the_screen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, step_ns in (("whole", 0), ("stepped", 500_000_000)):
+        sequence = stepped(mav_sequence(FRAMES), 10, step_ns)
+        folder = write_euroc_folder(tmp_path / name, sequence)
+        write_tum(tmp_path / f"{name}.tum", sequence.T_world_camera)
+        words = ("track", folder / "mav0", "--front-end", "file")
+        out = tmp_path / f"{name}_out"
+        assert airground(*words, "--trajectory", tmp_path / f"{name}.tum", "--out", out) == 0
+        note, warned = summary(out)["silence_note"], " ".join(capsys.readouterr().err.split())
+        if step_ns:
+            assert "all sensors are silent from 0.33 to 0.8" in note
+            assert "stamps are ahead by about 0.5" in note
+            assert f"mav: {note}" in warned
+        else:
+            assert note is None
+            assert "silent" not in warned
 
 
 def test_an_euroc_folder_is_tracked_and_measured(euroc: Path, tmp_path: Path) -> None:

@@ -32,7 +32,12 @@ from evaluation.setup.setups import Given, Setup
 from sim.recording.recorder import record
 from sim.scene import load_scene
 from sim.sensors.presets import NOMINAL
-from tests.evaluation.plain_recordings import content, write_euroc_folder, write_tum_folder
+from tests.evaluation.plain_recordings import (
+    content,
+    stepped,
+    write_euroc_folder,
+    write_tum_folder,
+)
 from tests.evaluation.show.scripted_run import ReadBack
 from tests.slam.synthetic_world import ground_sequence, mav_sequence
 
@@ -189,6 +194,24 @@ def test_files_replace_stages_and_the_summary_names_them(
     assert sources is not None
     of_ground = cloud.points[sources == Source.GROUND]
     assert {tuple(p) for p in of_ground.tolist()} == {tuple(p) for p in points.tolist()}
+
+
+def test_the_robot_whose_clock_steps_is_named(
+    tum: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sequence = stepped(mav_sequence(FRAMES), 6, 300_000_000)
+    euroc = write_euroc_folder(tmp_path / "euroc", sequence)
+    write_tum(tmp_path / "mav.tum", sequence.T_world_camera)
+    write_tum(tmp_path / "ground.tum", ground_sequence(FRAMES).T_world_camera)
+    words = ["run", "--mav", euroc, "--ground", tum, "--heading", "search"]
+    words += ["--mav-trajectory", tmp_path / "mav.tum"]
+    words += ["--ground-trajectory", tmp_path / "ground.tum", "--out", tmp_path / "out"]
+    assert airground(*words) == console.EXIT_OK
+    robots = json.loads((tmp_path / "out" / "summary.json").read_text())["robots"]
+    note = robots["mav"]["silence_note"]
+    assert "all sensors are silent from 0.2" in note
+    assert robots["ground"]["silence_note"] is None
+    assert f"mav: {note}" in " ".join(capsys.readouterr().err.split())
 
 
 REFUSED: dict[str, tuple[list[str], str]] = {
