@@ -17,6 +17,7 @@ from airground.io import layout
 from airground.io.calibration import RobotTable
 from airground.io.digests import path_digest
 from airground.io.euroc import read_image_list, read_imu, read_magnetic
+from airground.io.folder_links import check_links
 from airground.io.header import NAMES, Header, read_header
 from airground.io.image_files import ImageFiles, ImageSource, ListedFiles, listed_files
 from airground.io.images import warm_up_images
@@ -67,6 +68,7 @@ class RecordingFolder:
         path = Path(path)
         if not path.is_dir():
             raise RecordingError(f"{path}: no such recording (a folder with {layout.HEADER})")
+        check_links(path)
         header = read_header(path / layout.HEADER)
         mav_stamps, mav_files = _mav_images(path, header.frames.mav)
         ground_stamps, colour_files, depth_files = _ground_images(path, header.frames.ground)

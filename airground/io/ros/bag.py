@@ -20,6 +20,7 @@ from rosbags.typesys.store import Typestore
 
 from airground.core.arrays import I64
 from airground.errors import RecordingError
+from airground.io.folder_links import check_links
 from airground.io.input_files import SETTINGS_LIMIT, check_file
 
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
@@ -172,6 +173,7 @@ def _check_files(path: Path) -> None:
         if path.suffix == ".bag":
             _check_begin(path)
         return
+    check_links(path)
     check_file(path / "metadata.yaml", SETTINGS_LIMIT)
     for file in path.iterdir():
         check_file(file, BAG_LIMIT)
