@@ -34,6 +34,18 @@ from airground.io.registration import warm_up_registration
 from airground.io.robot_recording import Image, RobotRecording, check_same_clock
 from airground.io.tum import read_associations
 
+_WITH_DIGESTS = {
+    "mav": (
+        *(layout.MAV_CAMERA_LIST, layout.MAV_IMAGES),
+        *(layout.MAV_IMU_DATA, layout.MAV_MAGNETOMETER_DATA),
+    ),
+    "ground": (
+        *(layout.GROUND_ASSOCIATIONS, layout.GROUND_COLOUR, layout.GROUND_DEPTH),
+        *(layout.GROUND_IMU_DATA, layout.GROUND_MAGNETOMETER_DATA),
+    ),
+}
+"""What is read of a recording, by robot; the header has a digest of each."""
+
 
 @dataclass(frozen=True, eq=False)
 class RecordingFolder:
@@ -161,8 +173,12 @@ class RecordingFolder:
 
 def check_digests(path: Path, header: Header) -> None:
     """RecordingError names the first file or image folder of a recording unlike its digest in the
-    header."""
+    header, or without one."""
     places = listed_files(path, header.digests, path / layout.HEADER)
+    robots = [_WITH_DIGESTS[robot] for robot in header.frames.robots()]
+    bare = next((name for names in robots for name in names if name not in header.digests), None)
+    if bare is not None:
+        raise RecordingError(f"{path / layout.HEADER}: key 'digests': that of '{bare}' is missing")
     for place, digest in zip(places, header.digests.values(), strict=True):
         if not place.exists():
             raise RecordingError(f"{place}: is missing from the recording")
