@@ -150,10 +150,11 @@ def check_stamps(stamps: I64, path: Path) -> None:
     """RecordingError unless there is a stamp and all strictly increase."""
     if len(stamps) == 0:
         raise RecordingError(f"{path}: holds no entry")
-    steps = np.diff(stamps)
-    if (steps <= 0).any():
-        after = int(np.argmax(steps <= 0)) + 1
-        problem = "is there twice" if steps[after - 1] == 0 else f"follows {stamps[after - 1]}"
+    back = stamps[1:] <= stamps[:-1]  # a difference could overflow
+    if back.any():
+        after = int(np.argmax(back)) + 1
+        before = stamps[after - 1]
+        problem = "is there twice" if stamps[after] == before else f"follows {before}"
         raise RecordingError(
             f"{path}: stamp {stamps[after]} (entry {after + 1}) {problem}; "
             "stamps must strictly increase"

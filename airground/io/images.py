@@ -4,16 +4,17 @@ Images are PNG files, and colour or grey may be JPEG; the first bytes decide, no
 
 from __future__ import annotations
 
+import struct
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from PIL import UnidentifiedImageError
 from PIL.JpegImagePlugin import JpegImageFile
+from PIL.PngImagePlugin import PngImageFile
 
 from airground.core.arrays import F32, U8, U16, Scalar
 from airground.errors import RecordingError
@@ -26,6 +27,10 @@ PIXEL_LIMIT = 1 << 26
 thousands of millions."""
 _PNG_END = b"IEND\xaeB`\x82"
 _JPEG_START = b"\xff\xd8\xff"
+_DEEP, _GREY = 16, 0
+"""Bits per channel, and kind of pixels, in bytes 24 and 25 of a PNG file."""
+_DAMAGED = (SyntaxError, OSError, EOFError, LookupError, TypeError, ValueError, struct.error)
+"""What Pillow raises for a damaged PNG file."""
 
 
 def read_grey(path: Path, width: int, height: int) -> U8:
@@ -165,8 +170,14 @@ def _decode_jpeg(data: bytes) -> NDArray[Any]:
 
 
 def _decode_any(data: bytes) -> NDArray[Any]:
-    """The image in a PNG file of any kind; ValueError if it is damaged."""
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    if image is None:
-        raise ValueError("the PNG image is damaged")
-    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB) if image.ndim == 3 else image
+    """The image in a PNG file of another kind: with a palette, interlaced, or of few bits.
+    ValueError if it is damaged. OpenCV would write what is wrong to the screen."""
+    if data[24] == _DEEP and data[25] != _GREY:
+        raise ValueError("the PNG image has colours of 16 bits, expected 8")
+    try:
+        image = PngImageFile(BytesIO(data))
+        image.load()
+        mode = {"1": "L", "P": "RGB"}.get(image.mode)
+        return np.asarray(image if mode is None else image.convert(mode))
+    except (*_DAMAGED, UnidentifiedImageError) as error:
+        raise ValueError(f"the PNG image is damaged: {error}") from None

@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from airground.core.cloud import Source
+from airground.core.messages import MagneticSamples
 from airground.io.open_recording import open_robot
 from airground.io.recording import Recording
 from airground.io.sensor_file import read_imu_noise, read_positive
@@ -75,3 +77,13 @@ def test_a_recording_without_a_digest_is_not_verified(tmp_path: Path, name: str)
     edit(ours / "recording.toml", r"(?ms)^\[digests\].*?(?=^\[|\Z)", "")
     edit(ours / "recording.toml", r"(?m)^duration_s", "digests = {}\nduration_s")
     refused(Recording.open(ours).verify, "key 'digests': that of 'mav0/cam0/data.csv' is missing")
+
+
+@pytest.mark.parametrize("name", ["mav0/cam0/data.csv", "mav0/imu0/data.csv", "mav0/mag0/data.csv"])
+def test_a_last_stamp_whose_step_overflows(tmp_path: Path, name: str) -> None:
+    """The difference of the two is positive in 64 bits."""
+    ours = write_recording(tmp_path / "ours")
+    edit(ours / name, r"(?m)^\d+(?=,[^\n]*\n\Z)", str(-(2**63)))
+    refused(lambda: Recording.open(ours), rf"{name}: stamp -{2**63} \(entry \d+\) follows")
+    with pytest.raises(ValueError, match="must strictly increase"):
+        MagneticSamples(np.array([1, 2, -(2**63)]), np.zeros((3, 3)))
