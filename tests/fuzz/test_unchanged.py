@@ -48,7 +48,8 @@ def read_well(folder: Path, out: Path) -> tuple[dict[str, Any], list[list[float]
 
 def read_wrongly(folder: Path, out: Path) -> object:
     """Takes the order of keys, comments and line ends for a meaning."""
-    return read_well(folder, out), read_bytes(folder / "a.toml", SETTINGS_LIMIT)
+    names = "a.toml", "list/b.csv"
+    return read_well(folder, out), [read_bytes(folder / name, SETTINGS_LIMIT) for name in names]
 
 
 @pytest.mark.parametrize("read", [read_well, read_wrongly])
