@@ -5,7 +5,7 @@ OUT ?= results/demo
 # Tests run in parallel, those of a file in one process; more processes need too much memory.
 PYTEST := $(PYTHON_IN_VENV) -m pytest -q --numprocesses=$(shell nproc) --maxprocesses=4 --dist=loadfile
 
-.PHONY: demo setup test test-slow test-all test-uncompiled check docs regression format clean
+.PHONY: demo setup test test-slow test-all test-uncompiled check docs regression fuzz format clean
 
 demo: $(READY)
 	rm -rf $(OUT)
@@ -53,6 +53,12 @@ regression: $(READY)
 	.venv/bin/airground reproduce --suite fast --out $(OUT) \
 		$(if $(RECORDINGS),--recordings '$(RECORDINGS)',--render)
 	.venv/bin/airground check $(OUT)
+
+# Damaged inputs by the thousand: docs/reliability.md.
+fuzz: N = 10000
+fuzz: SEED = 1
+fuzz: $(READY)
+	$(PYTHON_IN_VENV) -m tests.fuzz --count $(N) --seed $(SEED)
 
 format: $(READY)
 	$(PYTHON_IN_VENV) -m ruff format .

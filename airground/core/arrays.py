@@ -64,7 +64,8 @@ def freeze(owner: object, name: str, shape: Sequence[int | None], dtype: type[np
 def freeze_stamps(owner: object) -> None:
     """`freeze` for the (N,) attribute `stamps_ns`, which must strictly increase."""
     freeze(owner, "stamps_ns", (None,), np.int64)
-    if (np.diff(vars(owner)["stamps_ns"]) <= 0).any():
+    stamps_ns = vars(owner)["stamps_ns"]
+    if (stamps_ns[1:] <= stamps_ns[:-1]).any():  # a difference could overflow
         raise ValueError("stamps_ns must strictly increase")
 
 

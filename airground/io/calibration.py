@@ -13,10 +13,16 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validat
 
 from airground.core.messages import CalibrationSigmas, ImuNoise, RobotCalibration
 from airground.core.se3 import FARTHEST_M, ROTATION_TOLERANCE, SE3
+from airground.io import calibration_ranges as ranges
 from airground.io.lens import COEFFICIENTS, MAX_READOUT_S, Lens, Model, Undistortion
 from airground.io.registration import Registration
 
-Positive = Annotated[float, Field(gt=0)]
+Rate = Annotated[float, Field(ge=ranges.MIN_RATE_HZ, le=ranges.MAX_RATE_HZ)]
+Focal = Annotated[float, Field(ge=ranges.MIN_FOCAL_PX, le=ranges.MAX_FOCAL_PX)]
+Noise = Annotated[float, Field(ge=ranges.MIN_NOISE, le=ranges.MAX_NOISE)]
+FieldNoise = Annotated[float, Field(ge=ranges.MIN_FIELD_NOISE_T, le=ranges.MAX_FIELD_NOISE_T)]
+Units = Annotated[float, Field(ge=ranges.MIN_UNITS_PER_M, le=ranges.MAX_UNITS_PER_M)]
+Offset = Annotated[int, Field(ge=-ranges.MAX_OFFSET_NS, le=ranges.MAX_OFFSET_NS)]
 Row = tuple[float, float, float, float]
 MAX_SIDE_PX = 8192
 """Largest side of an image [px]: images are decoded and undistorted whole."""
@@ -57,8 +63,10 @@ def _is_none(value: object) -> bool:
     return value is None
 
 
-Sigma = Annotated[float | None, Field(ge=0, exclude_if=_is_none)]
-"""A standard deviation; None where the file does not state it."""
+TurnSigma = Annotated[float | None, Field(ge=0, le=ranges.MAX_TURN_SIGMA_RAD, exclude_if=_is_none)]
+OffsetSigma = Annotated[float | None, Field(ge=0, le=ranges.MAX_OFFSET_NS, exclude_if=_is_none)]
+ScaleSigma = Annotated[float | None, Field(ge=0, le=ranges.MAX_SCALE_SIGMA, exclude_if=_is_none)]
+"""Standard deviations; None where the file does not state them."""
 
 
 def _or(stated: float | None, usual: float) -> float:
@@ -73,14 +81,14 @@ class CameraTable(Table):
 
     width: Annotated[int, Field(ge=1, le=MAX_SIDE_PX)]
     height: Annotated[int, Field(ge=1, le=MAX_SIDE_PX)]
-    fx: Positive
-    fy: Positive
+    fx: Focal
+    fy: Focal
     cx: float
     cy: float
-    rate_hz: Positive
-    time_offset_ns: int
+    rate_hz: Rate
+    time_offset_ns: Offset
     """What to add to a stamp of the camera to get the time on the IMU's clock [ns]."""
-    time_offset_sigma_ns: Sigma = None
+    time_offset_sigma_ns: OffsetSigma = None
     """Standard deviation of that [ns]."""
     distortion_model: Annotated[Model | None, Field(exclude_if=_is_none)] = None
     distortion_coefficients: Annotated[
@@ -127,14 +135,14 @@ class CameraTable(Table):
 class ImuTable(Table):
     """Rates and noise of an inertial sensor, as its data sheet says."""
 
-    rate_hz: Positive
-    gyro_noise_density: Positive
+    rate_hz: Rate
+    gyro_noise_density: Noise
     """[rad/s/sqrt(Hz)]"""
-    gyro_bias_walk: Positive
+    gyro_bias_walk: Noise
     """[rad/s^2/sqrt(Hz)]"""
-    accelerometer_noise_density: Positive
+    accelerometer_noise_density: Noise
     """[m/s^2/sqrt(Hz)]"""
-    accelerometer_bias_walk: Positive
+    accelerometer_bias_walk: Noise
     """[m/s^3/sqrt(Hz)]"""
 
     def noise(self) -> ImuNoise:
@@ -144,8 +152,8 @@ class ImuTable(Table):
 class MagnetometerTable(Table):
     """Rate and noise of a magnetometer, as its data sheet says."""
 
-    rate_hz: Positive
-    noise_t: Positive
+    rate_hz: Rate
+    noise_t: FieldNoise
     """Standard deviation of one sample per axis [T]."""
 
 
@@ -155,11 +163,11 @@ class DepthTable(Table):
     `camera` and `T_camera_depth` are left out where depth is registered to the colour camera: each
     pixel's depth is that of the colour image's pixel."""
 
-    units_per_m: Positive
+    units_per_m: Units
     """PNG value of one metre of depth along the optical axis."""
-    scale_sigma: Sigma = None
+    scale_sigma: ScaleSigma = None
     """Relative standard deviation of that."""
-    delay_ns: Annotated[int, Field(exclude_if=_is_zero)] = 0
+    delay_ns: Annotated[Offset, Field(exclude_if=_is_zero)] = 0
     """Time of a depth image minus that of the colour image with the same stamp [ns]."""
     T_camera_depth: Annotated[Pose | None, Field(exclude_if=_is_none)] = None
     """Pose of the depth camera in the colour camera."""
@@ -178,7 +186,7 @@ class RobotTable(Table):
 
     T_body_imu: Pose
     T_imu_camera: Pose
-    mounting_sigma_rad: Sigma = None
+    mounting_sigma_rad: TurnSigma = None
     """Standard deviation of the turn in `T_imu_camera`, per axis [rad]."""
     camera: CameraTable
     imu: ImuTable

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
-from airground.io.input_files import check_file
+from airground.io.input_files import TEXT_LIMIT, check_file
 
 
 def bytes_digest(data: bytes) -> str:
@@ -14,7 +14,8 @@ def bytes_digest(data: bytes) -> str:
 
 
 def file_digest(path: Path) -> str:
-    check_file(path)
+    """Of a list of samples or an image, the largest files of a recording; raises OSError."""
+    check_file(path, TEXT_LIMIT)
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -12,6 +12,7 @@ from airground.core.se3 import SE3
 from airground.errors import RecordingError
 from airground.io.calibration import CameraTable
 from airground.io.input_files import TEXT_LIMIT, read_text
+from airground.io.plausibility import check_field
 
 IMU_COLUMNS = (
     "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
@@ -35,7 +36,9 @@ def write_imu(path: Path, samples: ImuSamples) -> None:
 def read_magnetic(path: Path) -> MagneticSamples:
     """Read magnetic field samples [T]; raises like `read_imu`."""
     stamps, values = _read_samples(path, 3)
-    return MagneticSamples(stamps, values)
+    samples = MagneticSamples(stamps, values)
+    check_field(samples, path)
+    return samples
 
 
 def write_magnetic(path: Path, samples: MagneticSamples) -> None:
@@ -139,17 +142,19 @@ def read_lines(path: Path, limit: int = TEXT_LIMIT) -> list[str]:
     except FileNotFoundError:
         raise RecordingError(f"{path}: this file is missing from the recording") from None
     except (OSError, UnicodeDecodeError) as error:
-        raise RecordingError(f"{path}: cannot be read as text: {error}") from None
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise RecordingError(f"{path}: cannot be read as text: {reason}") from None
 
 
 def check_stamps(stamps: I64, path: Path) -> None:
     """RecordingError unless there is a stamp and all strictly increase."""
     if len(stamps) == 0:
         raise RecordingError(f"{path}: holds no entry")
-    steps = np.diff(stamps)
-    if (steps <= 0).any():
-        after = int(np.argmax(steps <= 0)) + 1
-        problem = "is there twice" if steps[after - 1] == 0 else f"follows {stamps[after - 1]}"
+    back = stamps[1:] <= stamps[:-1]  # a difference could overflow
+    if back.any():
+        after = int(np.argmax(back)) + 1
+        before = stamps[after - 1]
+        problem = "is there twice" if stamps[after] == before else f"follows {before}"
         raise RecordingError(
             f"{path}: stamp {stamps[after]} (entry {after + 1}) {problem}; "
             "stamps must strictly increase"

@@ -10,7 +10,7 @@ from typing import Protocol, overload
 from airground.core.arrays import F32, U8
 from airground.core.camera import PinholeCamera
 from airground.errors import RecordingError
-from airground.io.images import depth_units, read_colour, read_depth, read_grey
+from airground.io.images import depth_units, read_colour, read_depth, read_grey, read_image_bytes
 from airground.io.png_encoder import encode_png
 from airground.io.registration import Registration
 
@@ -87,7 +87,7 @@ class ImageFiles:
         """A file of depth of the colour image's pixels, in the recording's unit: the recording's
         own where it is registered."""
         if self.registration is None:
-            return self.ground_depth_files[index].read_bytes()
+            return read_image_bytes(self.ground_depth_files[index])
         return encode_png(depth_units(self.ground_depth(index), self.depth_units_per_m))
 
     def check_present(self) -> None:

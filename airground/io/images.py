@@ -4,26 +4,33 @@ Images are PNG files, and colour or grey may be JPEG; the first bytes decide, no
 
 from __future__ import annotations
 
+import struct
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from PIL import UnidentifiedImageError
 from PIL.JpegImagePlugin import JpegImageFile
+from PIL.PngImagePlugin import PngImageFile
 
 from airground.core.arrays import F32, U8, U16, Scalar
 from airground.errors import RecordingError
 from airground.io.input_files import IMAGE_LIMIT, read_bytes
+from airground.io.input_limits import how_to_raise, raised
 from airground.io.png import SIGNATURE, PngHeader, decode_png, warm_up_decoding
 
 PIXEL_LIMIT = 1 << 26
-"""Pixels of an image; a file of some megabytes can claim thousands of millions."""
+"""Most pixels of an image, unless the user raises all limits; a file of some megabytes can claim
+thousands of millions."""
 _PNG_END = b"IEND\xaeB`\x82"
 _JPEG_START = b"\xff\xd8\xff"
+_DEEP, _GREY = 16, 0
+"""Bits per channel, and kind of pixels, in bytes 24 and 25 of a PNG file."""
+_DAMAGED = (SyntaxError, OSError, EOFError, LookupError, TypeError, ValueError, struct.error)
+"""What Pillow raises for a damaged PNG file."""
 
 
 def read_grey(path: Path, width: int, height: int) -> U8:
@@ -78,7 +85,7 @@ def _to_metres(units: U16, units_per_m: np.float32, depth: F32) -> None:
 
 def image_size(path: Path) -> tuple[int, int]:
     """Width and height [px], from the file's first bytes; raises RecordingError."""
-    data = _bytes(path)
+    data = read_image_bytes(path)
     try:
         return size_of(data)
     except ValueError as error:
@@ -102,8 +109,9 @@ def decode(data: bytes) -> NDArray[Any]:
     """A PNG or JPEG image: grey (H, W), or colour (H, W, C) with RGB first.
     ValueError if it is damaged or larger than `PIXEL_LIMIT`."""
     width, height = size_of(data)
-    if width * height > PIXEL_LIMIT:
-        raise ValueError(f"{width}x{height} are more than {PIXEL_LIMIT} pixels")
+    if width * height > raised(PIXEL_LIMIT):
+        more = f"{width}x{height} are more than {raised(PIXEL_LIMIT)} pixels"
+        raise ValueError(f"{more}{how_to_raise(width * height, PIXEL_LIMIT)}")
     if data.startswith(_JPEG_START):
         return _decode_jpeg(data)
     if not data.endswith(_PNG_END):
@@ -111,8 +119,8 @@ def decode(data: bytes) -> NDArray[Any]:
     return decode_png(data) if PngHeader.read(data).pixel_bytes else _decode_any(data)
 
 
-def _bytes(path: Path) -> bytes:
-    """A file that starts as PNG or JPEG files do."""
+def read_image_bytes(path: Path) -> bytes:
+    """An image file as it is, not decoded; RecordingError where it is no PNG or JPEG file."""
     try:
         data = read_bytes(path, IMAGE_LIMIT)
     except OSError as error:
@@ -123,7 +131,7 @@ def _bytes(path: Path) -> bytes:
 
 
 def _read(path: Path, shape: tuple[int, ...], dtype: type[Scalar]) -> NDArray[Scalar]:
-    data = _bytes(path)
+    data = read_image_bytes(path)
     try:
         width, height = size_of(data)
         # Before anything is allocated for it.
@@ -162,8 +170,14 @@ def _decode_jpeg(data: bytes) -> NDArray[Any]:
 
 
 def _decode_any(data: bytes) -> NDArray[Any]:
-    """The image in a PNG file of any kind; ValueError if it is damaged."""
-    image = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    if image is None:
-        raise ValueError("the PNG image is damaged")
-    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB) if image.ndim == 3 else image
+    """The image in a PNG file of another kind: with a palette, interlaced, or of few bits.
+    ValueError if it is damaged. OpenCV would write what is wrong to the screen."""
+    if data[24] == _DEEP and data[25] != _GREY:
+        raise ValueError("the PNG image has colours of 16 bits, expected 8")
+    try:
+        image = PngImageFile(BytesIO(data))
+        image.load()
+        mode = {"1": "L", "P": "RGB"}.get(image.mode)
+        return np.asarray(image if mode is None else image.convert(mode))
+    except (*_DAMAGED, UnidentifiedImageError) as error:
+        raise ValueError(f"the PNG image is damaged: {error}") from None

@@ -12,7 +12,10 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from airground.io.input_limits import how_to_raise, raised
+
 MIB = 1 << 20
+# `raised` multiplies these.
 SETTINGS_LIMIT = 4 * MIB
 """Largest file of settings or calibration: a thousand times what they need."""
 TEXT_LIMIT = 1024 * MIB
@@ -37,7 +40,7 @@ def read_bytes(path: Path, limit: int) -> bytes:
 
     Args:
         path: File, or a link to one.
-        limit: Largest size [byte].
+        limit: Largest size [byte], unless the user raises all limits.
 
     Raises:
         OSError: It is missing, cannot be read, is no regular file, or is larger.
@@ -47,8 +50,19 @@ def read_bytes(path: Path, limit: int) -> bytes:
 
 
 def read_text(path: Path, limit: int) -> str:
-    """All of a text file; raises as `read_bytes`, and UnicodeDecodeError."""
-    return read_bytes(path, limit).decode("utf-8").replace("\r\n", "\n")
+    """All of a text file; raises as `read_bytes`, and UnicodeDecodeError.
+
+    OSError at the first zero byte, too: a sparse file below the limit would take many times its
+    size as lines.
+    """
+    check_file(path, limit)
+    data = bytearray()
+    with path.open("rb") as file:
+        while piece := file.read(MIB):
+            if 0 in piece:
+                raise OSError(errno.EINVAL, "has a zero byte, expected text in UTF-8", str(path))
+            data += piece
+    return data.decode("utf-8").replace("\r\n", "\n")
 
 
 def read_toml_text(path: Path) -> dict[str, Any]:
@@ -78,6 +92,7 @@ def check_file(path: Path, limit: int = MODEL_LIMIT) -> None:
         kinds = [name for is_kind, name in _KINDS.items() if is_kind(status.st_mode)]
         kind = kinds[0] if kinds else "no file"
         raise OSError(errno.EINVAL, f"is {kind}, expected a file", str(path))
-    if status.st_size > limit:
-        size = f"{status.st_size / MIB:.0f} MiB, expected at most {limit / MIB:.0f}"
-        raise OSError(errno.EFBIG, f"has {size}", str(path))
+    size = status.st_size
+    if size > raised(limit):
+        most = f"{size / MIB:.0f} MiB, expected at most {raised(limit) / MIB:.0f}"
+        raise OSError(errno.EFBIG, f"has {most}{how_to_raise(size, limit)}", str(path))

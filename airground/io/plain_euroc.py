@@ -19,6 +19,7 @@ from airground.core.messages import ImuNoise, ImuSamples, MavImage, RobotCalibra
 from airground.core.se3 import SE3
 from airground.errors import RecordingError
 from airground.io.euroc import read_image_list, read_imu, read_magnetic
+from airground.io.folder_links import check_links
 from airground.io.image_files import listed_files
 from airground.io.images import read_grey
 from airground.io.lens import Undistortion
@@ -56,6 +57,7 @@ def open_euroc(path: Path, calibration_file: Path | None = None) -> RobotRecordi
     folder = euroc_folder(path)
     if folder is None:
         raise RecordingError(f"{path}: has no mav0/cam0; is this an EuRoC folder?")
+    check_links(path)
     camera, camera_list = folder / "cam0", folder / "cam0" / "data.csv"
     sensor_file = calibration_file or camera / "sensor.yaml"
     lens = read_lens(sensor_file)

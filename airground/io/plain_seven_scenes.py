@@ -20,6 +20,7 @@ import numpy as np
 from airground.core.cloud import Source
 from airground.errors import RecordingError
 from airground.io.euroc import read_lines
+from airground.io.folder_links import check_links
 from airground.io.frame_numbers import stamps_of
 from airground.io.images import image_size
 from airground.io.lens import KINECT_READOUT_S, Lens
@@ -70,6 +71,7 @@ def open_seven_scenes(
     Raises:
         RecordingError: One line that names file or key and what would be right.
     """
+    check_links(path)
     numbers, colour, depth = _frames(path)
     calibration_file = calibration_in(path, calibration_file)
     scale, assumed = depth_scale_of(depth_units_per_m, calibration_file, DEPTH_UNITS_PER_M)

@@ -22,6 +22,7 @@ from airground.core.arrays import F64
 from airground.core.cloud import Source
 from airground.errors import RecordingError
 from airground.io.euroc import read_lines
+from airground.io.folder_links import check_links
 from airground.io.frame_numbers import SECOND_NS, are_frame_numbers, stamps_of
 from airground.io.lens import KINECT_READOUT_S, Lens
 from airground.io.plain_euroc import UP_LEVEL_CAMERA
@@ -85,6 +86,7 @@ def open_tum(
     Raises:
         RecordingError: One line that names file, key or stamp and what would be right.
     """
+    check_links(path)
     calibration_file = calibration_in(path, calibration_file)
     lens = lens_of(calibration_file) or _published_lens(path)
     scale, assumed = depth_scale_of(depth_units_per_m, calibration_file, DEPTH_UNITS_PER_M)

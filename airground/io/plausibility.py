@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from airground.core.arrays import F64, I64
-from airground.core.messages import ImuSamples
+from airground.core.messages import ImuSamples, MagneticSamples
 from airground.core.se3 import FARTHEST_M, SE3, nearest_rotation
 from airground.errors import RecordingError
 
@@ -26,6 +26,9 @@ MAX_GYRO = 100.0
 """Largest rate that gyros of robots measure: 4000 deg/s are 70 [rad/s]."""
 MAX_ACCELERATION = 4000.0
 """Largest specific force that accelerometers for shocks measure: 400 g [m/s^2]."""
+MAX_FIELD = 0.1
+"""Largest field that reaches a robot's magnetometer, a magnet touching it [T]; in microtesla or
+gauss the Earth's alone is more."""
 START_S = 1.0
 """Over this time the accelerometer is averaged to find what is up [s]."""
 RIGID_TOLERANCE = 1e-4
@@ -87,10 +90,9 @@ def upwards(imu: ImuSamples, imu_path: Path) -> F64:
     """(3,) unit vector that points up in the IMU as the recording starts.
     RecordingError if the accelerometer does not read gravity in m/s^2, or a sample is beyond what
     IMUs measure."""
-    _check_range(imu.gyro, MAX_GYRO, "gyro reads {:.3g} rad/s", imu, imu_path)
-    _check_range(
-        imu.accelerometer, MAX_ACCELERATION, "accelerometer reads {:.3g} m/s^2", imu, imu_path
-    )
+    stamps, gyro, force = imu.stamps_ns, imu.gyro, imu.accelerometer
+    _check_range(gyro, MAX_GYRO, "gyro reads {:.3g} rad/s", stamps, imu_path)
+    _check_range(force, MAX_ACCELERATION, "accelerometer reads {:.3g} m/s^2", stamps, imu_path)
     usual = float(np.median(np.linalg.norm(imu.accelerometer, axis=1)))
     low, high = GRAVITY_RANGE
     if not low <= usual <= high:
@@ -104,13 +106,21 @@ def upwards(imu: ImuSamples, imu_path: Path) -> F64:
     return result
 
 
-def _check_range(values: F64, limit: float, reads: str, imu: ImuSamples, path: Path) -> None:
+def check_field(samples: MagneticSamples, path: Path) -> None:
+    """RecordingError if a magnetometer reads more than a field in tesla can be."""
+    reads = "magnetometer reads {:.3g} T"
+    _check_range(samples.field, MAX_FIELD, reads, samples.stamps_ns, path, ", the Earth's is 5e-05")
+
+
+def _check_range(
+    values: F64, limit: float, reads: str, stamps_ns: I64, path: Path, usual: str = ""
+) -> None:
     beyond = (np.abs(values) > limit).any(axis=1)
     if beyond.any():
         index = int(np.argmax(beyond))
         said = reads.format(float(np.abs(values[index]).max()))
         raise RecordingError(
-            f"{path}: the {said} at stamp {imu.stamps_ns[index]}; expected at most {limit:g}"
+            f"{path}: the {said} at stamp {stamps_ns[index]}; expected at most {limit:g}{usual}"
         )
 
 

@@ -5,16 +5,17 @@ Open3D's reader ends the process at some damaged files; trimesh refuses meshes o
 
 from __future__ import annotations
 
+import os
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from airground.errors import InputError
-from airground.io.input_files import MODEL_LIMIT, read_bytes
+from airground.io.input_files import MIB, MODEL_LIMIT, check_file
 
 Table = NDArray[Any]
 """(N,) structured array: a field for each property of an element, by its name in the header."""
@@ -26,6 +27,12 @@ _TYPES |= {"int32": "i4", "uint32": "u4", "float32": "f4", "float64": "f8"}
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _MOST_LINES = 1000
 """Lines of the longest header."""
+_HEADER_LIMIT = MIB
+"""Longest header [byte]."""
+_LONGEST_LIST = 1 << 27
+"""Most items of a list: rows of more bytes than 2 GiB are no type of numpy."""
+_LINE_LIMIT = MIB
+"""Longest row in text [byte]; a sparse file is one line without end."""
 
 
 @dataclass(frozen=True)
@@ -52,23 +59,32 @@ def read_elements(path: Path, wanted: tuple[str, ...]) -> dict[str, Table]:
         InputError: One line: the file is missing, truncated, or holds something else.
     """
     try:
-        data = read_bytes(path, MODEL_LIMIT)
+        check_file(path, MODEL_LIMIT)
+        with path.open("rb") as file:
+            return _read_tables(path, file, wanted)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def _read_tables(path: Path, file: BinaryIO, wanted: tuple[str, ...]) -> dict[str, Table]:
+    """As `read_elements`: no more rows are read than the header claims and the file can hold."""
+    data = file.read(_HEADER_LIMIT)
     head, marker, body = data.partition(b"end_header")
     end_of_line = body.find(b"\n")
     if not data.startswith(b"ply") or not marker or end_of_line < 0:
         raise InputError(f"{path}: is no PLY file")
     order, elements = _parse_header(path, head.decode("ascii", "replace"))
     last = max((k for k, name in enumerate(elements) if name in wanted), default=-1)
-    rows = body[end_of_line + 1 :]
-    source = _Binary(path, rows, order) if order else _Text(path, rows)
+    start = len(head) + len(marker) + end_of_line + 1
+    size = os.fstat(file.fileno()).st_size
+    file.seek(start)
+    source = _Binary(path, file, order, start, size) if order else _Text(path, file, size)
     tables = {}
     for name, element in list(elements.items())[: last + 1]:
         table = source.take(name, element)
         if name in wanted:
             tables[name] = table
-    if last == len(elements) - 1 and source.left() > 0:
+    if last == len(elements) - 1 and source.goes_on():
         raise InputError(f"{path}: has more after the last row that its header names")
     return tables
 
@@ -117,25 +133,27 @@ def _parse_header(path: Path, head: str) -> tuple[str, dict[str, _Element]]:
 
 @dataclass
 class _Binary:
-    """The bytes after the header, taken from their start."""
+    """Rows of bytes in a file of `size` bytes; `start` is that of the next row."""
 
     path: Path
-    body: bytes
+    file: BinaryIO
     order: str
-    start: int = 0
+    start: int
+    size: int
 
-    def left(self) -> int:
-        """Number of bytes that no row has taken."""
-        return len(self.body) - self.start
+    def goes_on(self) -> bool:
+        """Whether there are bytes that no row has taken."""
+        return self.start < self.size
 
     def take(self, name: str, element: _Element) -> Table:
         kind = self._row_type(element)
         if element.count == 0 or kind.itemsize == 0:
             return np.zeros(0, kind)
-        need, there = element.count * kind.itemsize, self.left()
-        if need > there:
+        need, there = element.count * kind.itemsize, self.size - self.start
+        data = self._bytes(self.start, need) if need <= there else b""
+        if len(data) < need:
             raise _truncated(self.path, name, element.count, f"{need} bytes", f"{there}")
-        table = np.frombuffer(self.body, kind, element.count, self.start)
+        table = np.frombuffer(data, kind, element.count)
         self.start += need
         for other in kind.names or ():
             if other.startswith(_LENGTH) and np.ptp(table[other]) != 0:
@@ -152,32 +170,42 @@ class _Binary:
                 fields.append((name, self.order + kind))
             else:
                 length_type = np.dtype(self.order + kind[0])
-                first = self.body[at : at + length_type.itemsize]
+                first = self._bytes(at, length_type.itemsize)
                 whole = element.count > 0 and len(first) == length_type.itemsize
                 length = int(np.frombuffer(first, length_type)[0]) if whole else 0
-                if not 0 <= length <= len(self.body):
+                if not 0 <= length <= min(self.size - at, _LONGEST_LIST):
                     raise InputError(f"{self.path}: a list '{name}' has a length of {length}")
                 fields.append((_LENGTH + name, length_type))
                 fields.append((name, self.order + kind[1], (length,)))
             at = self.start + np.dtype(fields).itemsize
         return np.dtype(fields)
 
+    def _bytes(self, start: int, count: int) -> bytes:
+        self.file.seek(start)
+        return self.file.read(count)
+
 
 class _Text:
-    """The lines after the header, taken from their start."""
+    """Lines of text in a file of `size` bytes, read one after the other."""
 
-    def __init__(self, path: Path, body: bytes) -> None:
-        self.path = path
-        self.lines = body.splitlines()
+    def __init__(self, path: Path, file: BinaryIO, size: int) -> None:
+        self.path, self.file, self.size = path, file, size
 
-    def left(self) -> int:
-        """Number of lines with text that no row has taken."""
-        return sum(bool(line.strip()) for line in self.lines)
+    def goes_on(self) -> bool:
+        """Whether there is text that no row has taken."""
+        while piece := self.file.read(MIB):
+            if piece.strip():
+                return True
+        return False
 
     def take(self, name: str, element: _Element) -> Table:
-        rows, self.lines = self.lines[: element.count], self.lines[element.count :]
-        if len(rows) < element.count:
-            raise _truncated(self.path, name, element.count, "a line each", f"{len(rows)} lines")
+        # At least a digit and a separator for each number; the last may lack its own.
+        fewest = element.count * max(1, 2 * len(element.properties)) - 1
+        there = self.size - self.file.tell()
+        if fewest > there:
+            need = f"at least {fewest} bytes"
+            raise _truncated(self.path, name, element.count, need, f"{there}")
+        rows = [self._line(name, element, number) for number in range(element.count)]
         if not rows:
             return np.zeros(0, [(one, "f8") for one in element.properties])
         try:
@@ -188,6 +216,15 @@ class _Text:
             reason = str(error).splitlines()[0]
             raise InputError(f"{self.path}: element '{name}' is damaged: {reason}") from None
         return self._table(name, element, numbers)
+
+    def _line(self, name: str, element: _Element, number: int) -> bytes:
+        line = self.file.readline(_LINE_LIMIT + 1)
+        if not line:
+            there = f"{number} lines"
+            raise _truncated(self.path, name, element.count, "a line each", there)
+        if len(line) > _LINE_LIMIT:
+            raise InputError(f"{self.path}: a row of '{name}' has more than {_LINE_LIMIT} bytes")
+        return line.rstrip(b"\r\n")
 
     def _table(self, name: str, element: _Element, numbers: NDArray[np.float64]) -> Table:
         """Structured rows; a list has one column for its length before its items'."""

@@ -17,6 +17,7 @@ from airground.io import layout
 from airground.io.calibration import RobotTable
 from airground.io.digests import path_digest
 from airground.io.euroc import read_image_list, read_imu, read_magnetic
+from airground.io.folder_links import check_links
 from airground.io.header import NAMES, Header, read_header
 from airground.io.image_files import ImageFiles, ImageSource, ListedFiles, listed_files
 from airground.io.images import warm_up_images
@@ -32,6 +33,18 @@ from airground.io.plausibility import (
 from airground.io.registration import warm_up_registration
 from airground.io.robot_recording import Image, RobotRecording, check_same_clock
 from airground.io.tum import read_associations
+
+_WITH_DIGESTS = {
+    "mav": (
+        *(layout.MAV_CAMERA_LIST, layout.MAV_IMAGES),
+        *(layout.MAV_IMU_DATA, layout.MAV_MAGNETOMETER_DATA),
+    ),
+    "ground": (
+        *(layout.GROUND_ASSOCIATIONS, layout.GROUND_COLOUR, layout.GROUND_DEPTH),
+        *(layout.GROUND_IMU_DATA, layout.GROUND_MAGNETOMETER_DATA),
+    ),
+}
+"""What is read of a recording, by robot; the header has a digest of each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +80,7 @@ class RecordingFolder:
         path = Path(path)
         if not path.is_dir():
             raise RecordingError(f"{path}: no such recording (a folder with {layout.HEADER})")
+        check_links(path)
         header = read_header(path / layout.HEADER)
         mav_stamps, mav_files = _mav_images(path, header.frames.mav)
         ground_stamps, colour_files, depth_files = _ground_images(path, header.frames.ground)
@@ -159,8 +173,12 @@ class RecordingFolder:
 
 def check_digests(path: Path, header: Header) -> None:
     """RecordingError names the first file or image folder of a recording unlike its digest in the
-    header."""
+    header, or without one."""
     places = listed_files(path, header.digests, path / layout.HEADER)
+    robots = [_WITH_DIGESTS[robot] for robot in header.frames.robots()]
+    bare = next((name for names in robots for name in names if name not in header.digests), None)
+    if bare is not None:
+        raise RecordingError(f"{path / layout.HEADER}: key 'digests': that of '{bare}' is missing")
     for place, digest in zip(places, header.digests.values(), strict=True):
         if not place.exists():
             raise RecordingError(f"{place}: is missing from the recording")

@@ -185,7 +185,7 @@ class Pair:
 
 def check_same_clock(mav: RobotRecording[Any], ground: RobotRecording[Any]) -> None:
     """RecordingError if the ground robot begins after the MAV has ended."""
-    late_ns = int(ground.camera_stamps[0] - mav.camera_stamps[-1])
+    late_ns = int(ground.camera_stamps[0]) - int(mav.camera_stamps[-1])
     if late_ns > 0:
         raise RecordingError(
             f"{ground.path}: begins {late_ns / 1e9:.1f} s after {mav.path} ended; "

@@ -12,6 +12,7 @@ import yaml
 from airground.core.messages import ImuNoise
 from airground.core.se3 import SE3
 from airground.errors import RecordingError
+from airground.io import calibration_ranges as ranges
 from airground.io.calibration import MAX_SIDE_PX
 from airground.io.euroc import read_lines
 from airground.io.header import shortened
@@ -40,6 +41,11 @@ NOISE_KEYS = tuple(
 )
 DEPTH_UNITS, RATE = "depth_units_per_m", "rate_hz"
 """Keys of a calibration for the value of one metre of depth, and for folders without stamps."""
+_RANGES = {
+    **dict.fromkeys(NOISE_KEYS, (ranges.MIN_NOISE, ranges.MAX_NOISE)),
+    DEPTH_UNITS: (ranges.MIN_UNITS_PER_M, ranges.MAX_UNITS_PER_M),
+    RATE: (ranges.MIN_RATE_HZ, ranges.MAX_RATE_HZ),
+}
 READOUT = "readout_s"
 """Key of a camera that takes its rows one after the other."""
 
@@ -126,6 +132,11 @@ def checked_lens(
         )
     if min(width, height) < 1 or min(fx, fy) <= 0:
         raise RecordingError(f"{path}: image size and focal lengths (fx, fy) must be positive")
+    if min(fx, fy) < ranges.MIN_FOCAL_PX or max(fx, fy) > ranges.MAX_FOCAL_PX:
+        raise RecordingError(
+            f"{path}: key 'intrinsics': expected focal lengths from {ranges.MIN_FOCAL_PX:g} to "
+            f"{ranges.MAX_FOCAL_PX:g} pixels, got {fx:g} and {fy:g}"
+        )
     if max(width, height) > MAX_SIDE_PX:
         raise RecordingError(
             f"{path}: key 'resolution': {width}x{height} is more than {MAX_SIDE_PX} pixels a side"
@@ -171,7 +182,7 @@ def _readout(values: dict[str, Any], path: Path) -> float:
 def read_positive(path: Path, key: str) -> float | None:
     """A positive number; None where the file has no such key. Raises like `read_lens`."""
     values = read_mapping(path)
-    return _positive(values[key], key, path) if key in values else None
+    return _in_range(values[key], key, path) if key in values else None
 
 
 def read_pose(path: Path) -> SE3:
@@ -186,7 +197,7 @@ def read_pose(path: Path) -> SE3:
 def read_imu_noise(path: Path) -> ImuNoise:
     """Read an IMU's noise densities and random walks; raises like `read_lens`."""
     values = read_mapping(path)
-    return ImuNoise(*(_positive(_value(values, key, path), key, path) for key in NOISE_KEYS))
+    return ImuNoise(*(_in_range(_value(values, key, path), key, path) for key in NOISE_KEYS))
 
 
 def _positive(value: object, key: str, path: Path) -> float:
@@ -196,6 +207,16 @@ def _positive(value: object, key: str, path: Path) -> float:
             f"{path}: key '{key}': expected a positive number, got {shortened(value)}"
         )
     return number[0]
+
+
+def _in_range(value: object, key: str, path: Path) -> float:
+    number = _positive(value, key, path)
+    low, high = _RANGES[key]
+    if not low <= number <= high:
+        raise RecordingError(
+            f"{path}: key '{key}': expected a number from {low:g} to {high:g}, got {number:g}"
+        )
+    return number
 
 
 def _distortion(values: dict[str, Any], path: Path) -> tuple[str, tuple[float, ...]]:

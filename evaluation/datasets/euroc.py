@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +15,7 @@ from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.io import layout
 from airground.io.euroc import sensor_yaml
+from airground.io.input_files import SETTINGS_LIMIT, TEXT_LIMIT, read_bytes, read_text
 from airground.io.ply import write_ply
 from evaluation.datasets.simulated import Simulated, copy_images
 from evaluation.datasets.views import sample_surface
@@ -43,8 +43,9 @@ def write_euroc_folder(folder: Path, simulated: Simulated, robots: tuple[Robot, 
     copy_images(simulated.files.mav_files, folder / layout.MAV_IMAGES)
     for sensor in (layout.MAV_CAMERA, layout.MAV_IMU, layout.MAV_MAGNETOMETER):
         (folder / sensor).mkdir(exist_ok=True)
-        shutil.copyfile(recording.path / sensor / "data.csv", folder / sensor / "data.csv")
-        yaml = (recording.path / sensor / "sensor.yaml").read_text(encoding="utf-8")
+        samples = read_bytes(recording.path / sensor / "data.csv", TEXT_LIMIT)
+        (folder / sensor / "data.csv").write_bytes(samples)
+        yaml = read_text(recording.path / sensor / "sensor.yaml", SETTINGS_LIMIT)
         _write_yaml(folder / sensor / "sensor.yaml", yaml)
     header = recording.header
     comment = f"airground {header.scene}, seed {header.seed}, flight {header.flight}"

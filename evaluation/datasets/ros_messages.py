@@ -14,6 +14,7 @@ from rosbags.typesys import Stores, get_typestore
 from airground.core.camera import PinholeCamera
 from airground.core.se3 import SE3
 from airground.io.calibration import ImuTable, MagnetometerTable
+from airground.io.images import read_image_bytes
 from airground.io.lens import Lens
 
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
@@ -40,7 +41,7 @@ def compressed_image(stamp_ns: int, frame: str, png: Path) -> Any:
         "sensor_msgs/msg/CompressedImage",
         header=header(stamp_ns, frame),
         format="png",
-        data=np.fromfile(png, np.uint8),
+        data=np.frombuffer(read_image_bytes(png), np.uint8),
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +16,7 @@ from airground.core.se3 import SE3
 from airground.errors import InputError, RecordingError
 from airground.io.calibration import RobotTable
 from airground.io.image_files import ImageFiles
+from airground.io.images import read_image_bytes
 from airground.io.layout import HEADER
 from airground.io.recording_folder import RecordingFolder
 from airground.io.robot_recording import RobotRecording
@@ -117,4 +117,4 @@ def copy_images(files: Sequence[Path], folder: Path) -> None:
     """Copy images into a new folder, byte by byte, under their own names."""
     folder.mkdir(parents=True)
     for file in files:
-        shutil.copyfile(file, folder / file.name)
+        (folder / file.name).write_bytes(read_image_bytes(file))

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from airground.io.images import read_image_bytes
 from airground.io.lens import Lens
 from evaluation.datasets.dataset_card import Shard, write_croissant, write_dataset_card
 from evaluation.datasets.simulated import Simulated
@@ -82,7 +83,7 @@ def _samples(simulated: Simulated, robot: Robot) -> Iterator[Sample]:
             "camera": _camera(truth.lens(robot)),
             "T_world_camera": truth.T_world_camera(robot, stamp_ns).matrix().tolist(),
         }
-        content = {"grey.png" if robot == "mav" else "colour.png": images[index].read_bytes()}
+        content = {"grey.png" if robot == "mav" else "colour.png": read_image_bytes(images[index])}
         if robot == "ground":
             content["depth.png"] = files.depth_png(index)
             depth = truth.calibration.ground.depth

@@ -53,6 +53,8 @@ _DTYPES = {
     "time_s": "float64",
 }
 
+_UNREADABLE = (OSError, ValueError, TypeError, LookupError, AttributeError, ArrowException)
+"""What pandas raises for a damaged file, whose notes on its own columns it does not check."""
 _MEASURED = ("value", "unit", "note", "time_s")
 """Columns that do not tell measurements apart."""
 
@@ -121,7 +123,7 @@ class ResultTable:
         try:
             check_file(path)
             frame = pd.read_parquet(path)
-        except (OSError, ValueError, MemoryError) as error:
+        except (*_UNREADABLE, MemoryError) as error:
             raise InputError(f"{path}: no readable results table ({error})") from error
         try:
             table = cls(frame)

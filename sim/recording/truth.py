@@ -27,6 +27,7 @@ from airground.core.se3 import SE3
 from airground.core.trajectory import Trajectory
 from airground.errors import RecordingError
 from airground.io.calibration import CalibrationTable, RobotTable
+from airground.io.folder_links import check_links
 from airground.io.header import parse_table, read_toml, write_toml
 from airground.io.layout import TRUTH
 from airground.io.lens import Lens
@@ -65,6 +66,7 @@ class Truth:
             raise RecordingError(
                 f"{folder}: this recording has no truth (where it is sealed, that is elsewhere)"
             )
+        check_links(folder)
         path = folder / "calibration.toml"
         calibration = parse_table(CalibrationTable, read_toml(path), path)
         return cls(folder, Motion.load(folder / "motion.npz"), calibration)

@@ -17,7 +17,10 @@ from pathlib import Path
 import numpy as np
 
 from evaluation.setup import console
+from tests.fuzz.bombs import BOMBS
 from tests.fuzz.damage import BYTES, TEXT, replace_place
+from tests.fuzz.harmless import KEPT, LINK, changes_of, put_behind_link
+from tests.fuzz.meaning import meaning
 from tests.fuzz.structure import BY_SUFFIX
 from tests.fuzz.subjects import SUBJECTS, fresh
 
@@ -36,6 +39,9 @@ MEMORY_MIB = 1024
 LONGEST_LINE = 1000
 """Characters of the longest message that a reader can take in."""
 PLACE = "another thing in its place"
+BOMB = "bomb"
+UNCHANGED = "nothing changed"
+"""Damages after which an input, where it is accepted, must mean what it meant before."""
 
 
 Announce = Callable[[str, str, str], object]
@@ -71,6 +77,7 @@ class Bench:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._contents: dict[str, dict[Path, bytes]] = {}
+        self._meanings: dict[str, str] = {}
 
     def run(self, seed: int, number: int, announce: Announce) -> Outcome:
         """Draw a case, damage the input, say so, use it, and mend it."""
@@ -82,26 +89,40 @@ class Bench:
         suffix = suffixes[int(rng.integers(len(suffixes)))]
         files = sorted(path for path in contents if path.suffix == suffix)
         path = files[int(rng.integers(len(files)))]
-        damage = self._damage(path, contents[path], rng)
+        damage = self._damage(name, path, contents[path], rng)
+        unchanged = damage.startswith(UNCHANGED)
         relative = str(path.relative_to(self._folder / "in" / name))
         announce(name, damage, relative)
         try:
-            verdict, words, seconds = self._use(name, number % WORKED_ON == 0)
+            work = number % WORKED_ON == 0 and not unchanged
+            verdict, words, seconds, read = self._use(name, work)
         finally:
             self._mend(name, path)
+        if unchanged and verdict == "works" and meaning(read) != self._meanings[name]:
+            verdict = "means something else"
+        damage = UNCHANGED if unchanged else damage
         return Outcome(number, name, damage, relative, verdict, words, seconds)
 
     def check_good(self) -> None:
         """Every kind of input works before it is damaged."""
         for name in SUBJECTS:
             self._good(name)
-            verdict, words, _ = self._use(name, work=True)
-            assert verdict == "works", f"{name}: {verdict}: {words}"
+            for work in (True, False):
+                verdict, words, _, read = self._use(name, work)
+                assert verdict == "works", f"{name}: {verdict}: {words}"
+            self._meanings[name] = meaning(read)
 
-    def _use(self, name: str, work: bool) -> tuple[str, str, float]:
+    def _use(self, name: str, work: bool) -> tuple[str, str, float, object]:
+        """As `judge`, and what was read."""
         subject, folder = SUBJECTS[name], self._folder / "in" / name
         use = subject.work if work else subject.read
-        return judge(lambda: use(folder, fresh(self._folder / "out")), self._folder / "screen")
+        read: list[object] = []
+
+        def command() -> None:
+            read.append(use(folder, fresh(self._folder / "out")))
+
+        judged = judge(command, self._folder / "screen")
+        return *judged, read[0] if read else None
 
     def _good(self, name: str) -> dict[Path, bytes]:
         if name not in self._contents:
@@ -111,18 +132,37 @@ class Bench:
             self._contents[name] = {path: path.read_bytes() for path in files}
         return self._contents[name]
 
-    def _damage(self, path: Path, data: bytes, rng: np.random.Generator) -> str:
+    def _damage(self, name: str, path: Path, data: bytes, rng: np.random.Generator) -> str:
+        """Damage a file; returns what was done."""
         kinds = dict(BYTES) if path.suffix in BINARY else dict(BYTES) | dict(TEXT) | dict(TEXT)
         names = [*kinds, PLACE]
         if path.suffix in BY_SUFFIX:
             label, structural = BY_SUFFIX[path.suffix]
             kinds[label] = structural
             names += [label] * (len(names) // 2)
+        if path.suffix in BOMBS:
+            kinds[BOMB] = BOMBS[path.suffix]
+            names += [BOMB] * 2
+        changes = changes_of(path, data)
+        names += [UNCHANGED] * (2 if changes else 1)
         kind = names[int(rng.integers(len(names)))]
+        if kind == UNCHANGED:
+            return f"{UNCHANGED}: {self._change(name, path, data, rng)}"
         if kind == PLACE:
             replace_place(path, rng)
         else:
             path.write_bytes(kinds[kind](data, rng))
+        return kind
+
+    def _change(self, name: str, path: Path, data: bytes, rng: np.random.Generator) -> str:
+        """Do what changes nothing, and bring the digests of a recording up to date."""
+        changes, folder = changes_of(path, data), self._folder / "in" / name
+        kind = [LINK, *changes][int(rng.integers(1 + len(changes)))]
+        if kind == LINK:
+            put_behind_link(path, folder)
+        else:
+            path.write_bytes(changes[kind](data, rng))
+            SUBJECTS[name].settle(folder, path)
         return kind
 
     def _mend(self, name: str, path: Path) -> None:
@@ -131,7 +171,11 @@ class Bench:
                 shutil.rmtree(there)
             else:
                 there.unlink(missing_ok=True)
-        path.write_bytes(self._contents[name][path])
+        for kept in (self._folder / "in" / name).rglob(KEPT):
+            kept.unlink()
+        for file, data in self._contents[name].items():
+            if file == path or (file.suffix == ".toml" and file.read_bytes() != data):
+                file.write_bytes(data)
 
 
 def judge(use: Callable[[], object], screen_file: Path) -> tuple[str, str, float]:

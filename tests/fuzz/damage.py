@@ -163,8 +163,19 @@ TEXT: dict[str, Damage] = {
 }
 
 
+SPARSE = [3 << 20, 200 << 20, 1000 << 20, 7 << 30, 9 << 30]
+"""Sizes of sparse files, below and above the limits of `SECURITY.md` [byte]."""
+
+
+def make_sparse(path: Path, data: bytes, rng: Rng) -> None:
+    """A file that takes no room on disk: of zeros, or with zeros after what it held."""
+    path.write_bytes(data if rng.random() < 0.5 else b"")
+    os.truncate(path, int(rng.choice(SPARSE)))
+
+
 def replace_place(path: Path, rng: Rng) -> None:
     """What stands at a file's path becomes something else; `path` is removed before."""
+    data = b"" if path.is_dir() else path.read_bytes()
     if path.is_dir():
         for inner in path.iterdir():
             inner.unlink()
@@ -186,8 +197,7 @@ def replace_place(path: Path, rng: Rng) -> None:
         case 5:
             path.symlink_to(outside)
         case 6:
-            with path.open("wb") as file:
-                file.truncate(9 << 30)
+            make_sparse(path, data, rng)
         case 7:
             path.symlink_to(path.parent)
         case _:

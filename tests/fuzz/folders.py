@@ -11,7 +11,9 @@ import numpy as np
 
 from airground.config import Config
 from airground.core.cloud import Source
-from airground.io.layout import TRUTH
+from airground.io.digests import path_digest
+from airground.io.header import read_header, write_toml
+from airground.io.layout import HEADER, TRUTH
 from airground.io.open_recording import open_robot
 from airground.io.recording import Recording
 from evaluation.datasets.formats import FORMATS, robots_for
@@ -41,14 +43,13 @@ def track(path: Path, robot: Source, out: Path, calibration_file: Path | None = 
     write_alone(out, recording, "slam", run_alone(recording, front_end), true_pose)
 
 
-def read_robot(path: Path, robot: Source, calibration_file: Path | None = None) -> None:
+def read_robot(path: Path, robot: Source, calibration_file: Path | None = None) -> object:
     """All samples and images, and the true poses where there are any."""
     recording = open_robot(path, robot, calibration_file)
-    for _ in recording.messages():
-        pass
+    messages = list(recording.messages())
     true_pose = true_camera(recording)
-    if true_pose is not None:
-        true_pose(int(recording.camera_stamps[-1]))
+    last = None if true_pose is None else true_pose(int(recording.camera_stamps[-1]))
+    return recording.calibration, messages, recording.T_pose_camera, recording.assumed, last
 
 
 def make_recording(folder: Path) -> None:
@@ -75,17 +76,28 @@ def first_samples(motion: Motion, count: int) -> Motion:
     return Motion(stamps_ns=motion.stamps_ns[:count], **robots)
 
 
-def read_recording(folder: Path, out: Path) -> None:
+def read_recording(folder: Path, out: Path) -> object:
     root = folder / "recording"
     recording = Recording.open(root)
-    for _ in recording.messages():
-        pass
-    DropList.read(folder / "dropped.json", recording)
+    messages = list(recording.messages())
+    dropped = DropList.read(folder / "dropped.json", recording)
     truth = Truth.open(root)
-    truth.T_world_mav_camera(int(recording.mav.camera_stamps[1]))
-    truth.depth("ground", int(recording.ground.camera_stamps[0]))
-    read_parts(root / TRUTH / "parts.csv")
+    pose = truth.T_world_mav_camera(int(recording.mav.camera_stamps[1]))
+    depth = truth.depth("ground", int(recording.ground.camera_stamps[0]))
+    parts = read_parts(root / TRUTH / "parts.csv")
     Simulated.open(root)
+    facts = recording.header.model_dump(exclude={"digests"})
+    return facts, messages, dropped, truth.calibration, pose, depth, parts
+
+
+def update_digest(folder: Path, path: Path) -> None:
+    """The header's digest of a file that was changed, or of its folder."""
+    root = folder / "recording"
+    header = read_header(root / HEADER)
+    for name in header.digests:
+        if root / name in (path, path.parent):
+            digests = header.digests | {name: path_digest(root / name)}
+            write_toml(root / HEADER, header.model_copy(update={"digests": digests}))
 
 
 def work_on_recording(folder: Path, out: Path) -> None:
@@ -109,9 +121,9 @@ def make_euroc(folder: Path) -> None:
     (folder / "camera.yaml").write_text(CAMERA_YAML)
 
 
-def read_euroc(folder: Path, out: Path) -> None:
-    read_robot(folder / "euroc", Source.MAV)
-    read_robot(folder / "euroc", Source.MAV, folder / "camera.yaml")
+def read_euroc(folder: Path, out: Path) -> object:
+    root = folder / "euroc"
+    return [read_robot(root, Source.MAV, file) for file in (None, folder / "camera.yaml")]
 
 
 def work_on_euroc(folder: Path, out: Path) -> None:
@@ -139,9 +151,9 @@ def make_seven_scenes(folder: Path) -> None:
     (folder / "camera.yaml").write_text(CAMERA_YAML)
 
 
-def read_rgbd(name: str) -> Callable[[Path, Path], None]:
-    def read(folder: Path, out: Path) -> None:
-        read_robot(folder / name, Source.GROUND, folder / "camera.yaml")
+def read_rgbd(name: str) -> Callable[[Path, Path], object]:
+    def read(folder: Path, out: Path) -> object:
+        return read_robot(folder / name, Source.GROUND, folder / "camera.yaml")
 
     return read
 
@@ -166,9 +178,9 @@ def make_bags(ros1: bool) -> Callable[[Path], None]:
     return make
 
 
-def read_bags(folder: Path, out: Path) -> None:
-    for name, robot in (("mav", Source.MAV), ("ground", Source.GROUND)):
-        read_robot(bag(folder, name), robot)
+def read_bags(folder: Path, out: Path) -> object:
+    robots = ("mav", Source.MAV), ("ground", Source.GROUND)
+    return [read_robot(bag(folder, name), robot) for name, robot in robots]
 
 
 def work_on_bags(folder: Path, out: Path) -> None:

@@ -21,8 +21,6 @@ from evaluation.datasets.plan import Plan
 from evaluation.judge.accepted import Accepted, Measured
 from evaluation.judge.results import CONFIG, SHOWCASE, SUMMARY, TABLE, merged, read_results
 from evaluation.judge.runs import against, read_runs
-from evaluation.judge.score.benchmark import Benchmark, read_benchmark
-from evaluation.judge.score.submission import read_submission
 from evaluation.judge.summary import RunInfo, build_summary
 from evaluation.judge.verdict import compare
 from evaluation.measure.plans.dials import Subject as DialSubject
@@ -31,10 +29,8 @@ from evaluation.measure.plans.sweep import parse_vary, points
 from evaluation.measure.work.batch_system import read_jobs
 from evaluation.run.given_map import read_map
 from evaluation.setup.checked_json import read_checked
-from evaluation.setup.level_mark import LevelMark
 from evaluation.setup.settings import EVALUATOR_SECTIONS, resolve, resolve_all, write_config
 from evaluation.show.comparison.verdict_table import junit, markdown
-from evaluation.table.answer_file import write_answers
 from sim.robots.motion import simulate_motion
 from sim.scene import load_scene
 from sim.sensors.presets import sensor_preset
@@ -51,11 +47,14 @@ from tests.fuzz.folders import (
     read_euroc,
     read_recording,
     read_rgbd,
+    update_digest,
     work_on_bags,
     work_on_euroc,
     work_on_recording,
     work_on_rgbd,
 )
+from tests.fuzz.harmless import KEPT
+from tests.fuzz.submissions import make_submission, read_scored, work_on_scored
 
 
 @dataclass(frozen=True)
@@ -64,15 +63,18 @@ class Subject:
 
     Attributes:
         make: Writes a good one into an empty folder.
-        read: Reads all of it from that folder; the second folder takes what is written.
+        read: Reads all of it from that folder, and returns that; the second folder takes what is
+            written.
         work: Does with it what the commands do, which takes longer.
         weight: How often it is chosen, relative to the others.
+        settle: Brings what an input states of a changed file up to date.
     """
 
     make: Callable[[Path], object]
     read: Callable[[Path, Path], object]
     work: Callable[[Path, Path], object]
     weight: int = 1
+    settle: Callable[[Path, Path], object] = lambda folder, path: None
 
 
 BODY = """
@@ -90,9 +92,9 @@ def make_scenes(folder: Path) -> None:
         (folder / f"{name}.toml").write_text(text + (BODY if name == "tiny" else ""))
 
 
-def read_scenes(folder: Path, out: Path) -> None:
-    for file in sorted(folder.iterdir()):
-        load_scene(str(file))
+def read_scenes(folder: Path, out: Path) -> object:
+    files = sorted(file for file in folder.iterdir() if file.name != KEPT)
+    return [load_scene(str(file)) for file in files]
 
 
 def work_on_scenes(folder: Path, out: Path) -> None:
@@ -118,16 +120,16 @@ def make_settings(folder: Path) -> None:
     (folder / "jobs.yaml").write_text(f"jobqueue: {lines}\njobs: 3\n")
 
 
-def read_settings(folder: Path, out: Path) -> None:
+def read_settings(folder: Path, out: Path) -> object:
     """As every verb with `--config`, `--set`, `--vary` and `--cluster`."""
-    write_config(resolve(file=folder / "config.toml"), out / "config.toml")
+    config = resolve(file=folder / "config.toml")
+    write_config(config, out / "config.toml")
     words = _words(folder / "words.txt")
     settings = resolve_all(overrides=words, sections=EVALUATOR_SECTIONS)
     vary = _words(folder / "vary.txt")
     start = DialSubject(load_scene("flat"), sensor_preset("nominal"), settings.pipeline())
-    for point in points(parse_vary(vary)):
-        turned(start, point)
-    read_jobs(folder / "jobs.yaml")
+    subjects = [turned(start, point) for point in points(parse_vary(vary))]
+    return config, words, vary, [one.scene for one in subjects], read_jobs(folder / "jobs.yaml")
 
 
 def _words(file: Path) -> list[str]:
@@ -151,12 +153,18 @@ def make_run(folder: Path) -> None:
     accepted.write(folder / "accepted.json")
 
 
-def read_run(folder: Path, out: Path) -> None:
+def read_run(folder: Path, out: Path) -> object:
     """As `airground evaluate`, without drawing."""
     results = merged([read_results(folder / "first"), read_results(folder / "second")])
-    for condition in results.table.conditions():
-        build_summary(results.table, condition, RunInfo.here(0)).write(out / SUMMARY)
-    Accepted.read(folder / "accepted.json").measured()
+    run = RunInfo.here(0)
+    summaries = [
+        build_summary(results.table, condition, run) for condition in results.table.conditions()
+    ]
+    for summary in summaries:
+        summary.write(out / SUMMARY)
+    accepted = Accepted.read(folder / "accepted.json")
+    accepted.measured()
+    return summaries, accepted, results.showcase
 
 
 def work_on_run(folder: Path, out: Path) -> None:
@@ -194,40 +202,20 @@ def make_clouds(folder: Path) -> None:
     (folder / "dataset.json").write_text(json.dumps(plan))
 
 
-def read_clouds(folder: Path, out: Path) -> None:
+def read_clouds(folder: Path, out: Path) -> object:
     """As `--ground-map`, `--trajectory` and `inspect` of a dataset."""
     cloud, sources = read_ply(folder / "cloud.ply")
     write_ply(out / "cloud.ply", cloud, sources)
-    for name in ("map", "mesh"):
-        read_map(folder / f"{name}.ply")
-    read_tum(folder / "poses.tum")
-    read_checked(Plan, folder / "dataset.json", "plan of a dataset")
-
-
-def make_submission(folder: Path) -> None:
-    """Answers of two runs to a benchmark, and what it was made from."""
-    lines = [f"{n / 30:.9f} {n / 100} 0 0 0 0 0 1 {n % 2}" for n in range(1, 60)]
-    for name in ("run1/0001.tum", "run2/0001.txt"):
-        (folder / "submission" / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / "submission" / name).write_text("\n".join(["# answers", *lines]) + "\n")
-    commas = "\n".join(line.replace(" ", ",") for line in lines) + "\n"
-    (folder / "submission" / "run2" / "0002.csv").write_text(commas)
-    (folder / "submission" / "submission.toml").write_text('name = "Ours"\nby = "a group"\n')
-    (folder / "truth").mkdir()
-    level = LevelMark(name="hard", version=1)
-    Benchmark(schema=1, level=level, seed=1, recordings=("0001", "0002")).write(folder / "truth")
-
-
-def read_scored(folder: Path, out: Path) -> None:
-    """As `score` reads them."""
-    read_benchmark(folder / "truth")
-    for run in read_submission(folder / "submission", {"0001", "0002"}).runs:
-        for name, answers in run.items():
-            write_answers(out / f"{name}.tum", answers.claims())
+    maps = [read_map(folder / f"{name}.ply") for name in ("map", "mesh")]
+    poses = read_tum(folder / "poses.tum")
+    plan = read_checked(Plan, folder / "dataset.json", "plan of a dataset")
+    return cloud, sources, maps, poses, plan
 
 
 SUBJECTS: dict[str, Subject] = {
-    "recording with truth": Subject(make_recording, read_recording, work_on_recording, 3),
+    "recording with truth": Subject(
+        make_recording, read_recording, work_on_recording, 3, update_digest
+    ),
     "EuRoC folder": Subject(make_euroc, read_euroc, work_on_euroc, 2),
     "TUM RGB-D folder": Subject(make_tum, read_rgbd("tum"), work_on_rgbd("tum"), 2),
     "7-Scenes folder": Subject(make_seven_scenes, read_rgbd("seq-01"), work_on_rgbd("seq-01")),
@@ -237,7 +225,7 @@ SUBJECTS: dict[str, Subject] = {
     "settings": Subject(make_settings, read_settings, read_settings, 2),
     "results": Subject(make_run, read_run, work_on_run, 2),
     "clouds, poses, plans": Subject(make_clouds, read_clouds, read_clouds, 2),
-    "submissions": Subject(make_submission, read_scored, read_scored),
+    "submissions": Subject(make_submission, read_scored, work_on_scored),
 }
 
 

@@ -39,6 +39,7 @@ def refused(action: Callable[[], object], pattern: str) -> None:
     assert len(message) < 1000
 
 
+LED = "(leads out of the recording|has a zero byte)"
 OUTSIDE = ["../../../../etc/secret.png", "/etc/secret.png", "a/../../b.png", "a\0b.png"]
 
 
@@ -46,16 +47,16 @@ OUTSIDE = ["../../../../etc/secret.png", "/etc/secret.png", "a/../../b.png", "a\
 def test_names_that_lead_elsewhere(tmp_path: Path, name: str) -> None:
     ours = write_recording(tmp_path / "ours")
     edit(ours / "mav0/cam0/data.csv", r"83333333\.png", name)
-    refused(lambda: Recording.open(ours), r"mav0/cam0/data\.csv: .* leads out of the recording")
+    refused(lambda: Recording.open(ours), rf"mav0/cam0/data\.csv: .* {LED}")
     ours = write_recording(tmp_path / "ground")
     edit(ours / "ground/associations.txt", r"depth/\S+", name)
-    refused(lambda: Recording.open(ours), r"associations\.txt: .* leads out of the recording")
+    refused(lambda: Recording.open(ours), rf"associations\.txt: .* {LED}")
     euroc = write_euroc(tmp_path / "euroc")
     edit(euroc / "mav0/cam0/data.csv", r"(?<=,)\d+\.png", name)
-    refused(lambda: open_robot(euroc, Source.MAV), r"cam0/data\.csv: .* leads out")
+    refused(lambda: open_robot(euroc, Source.MAV), rf"cam0/data\.csv: .* {LED}")
     tum = write_tum(tmp_path / "rgbd_dataset_freiburg1_xyz")
     edit(tum / "rgb.txt", r"rgb/\S+png", name)
-    refused(lambda: open_robot(tum, Source.GROUND), r"rgb\.txt: .* leads out")
+    refused(lambda: open_robot(tum, Source.GROUND), rf"rgb\.txt: .* {LED}")
 
 
 @pytest.mark.parametrize("name", ["../../etc/secret", "/etc/secret"])

@@ -4,17 +4,26 @@ from __future__ import annotations
 
 import os
 import re
+import tracemalloc
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
-from airground.errors import AirgroundError
+from airground.errors import AirgroundError, InputError
 from airground.io.header import read_toml
 from airground.io.images import read_grey
-from airground.io.input_files import SETTINGS_LIMIT, check_file, read_bytes, read_text
+from airground.io.input_files import (
+    SETTINGS_LIMIT,
+    TEXT_LIMIT,
+    check_file,
+    read_bytes,
+    read_text,
+)
+from airground.io.input_limits import INPUT_LIMITS
 from airground.io.ply import read_ply
 from airground.io.recording import Recording
 from airground.io.sensor_file import read_mapping
@@ -118,3 +127,61 @@ def test_a_file_may_be_empty(tmp_path: Path) -> None:
     (tmp_path / "empty").touch()
     assert read_bytes(tmp_path / "empty", 0) == b""
     assert np.frombuffer(read_bytes(tmp_path / "empty", 0), np.uint8).size == 0
+
+
+def test_a_sparse_list_below_the_limit_is_not_read_whole(tmp_path: Path) -> None:
+    path = tmp_path / "data.csv"
+    path.write_text("1,2,3\n")
+    with path.open("r+b") as file:
+        file.truncate(TEXT_LIMIT)
+    tracemalloc.start()
+    with pytest.raises(OSError, match="has a zero byte, expected text"):
+        read_text(path, TEXT_LIMIT)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 8 << 20
+
+
+def test_a_limit_can_be_raised(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(bytes(41))
+    monkeypatch.delenv(INPUT_LIMITS, raising=False)
+    with pytest.raises(OSError, match=rf"expected at most 0 \({INPUT_LIMITS}=5 allows it\)"):
+        read_bytes(path, 10)
+    monkeypatch.setenv(INPUT_LIMITS, "4")
+    with pytest.raises(OSError, match=rf"{INPUT_LIMITS}=5 allows it"):
+        read_bytes(path, 10)
+    for enough in ("5", "4.1", "1024"):
+        monkeypatch.setenv(INPUT_LIMITS, enough)
+        assert read_bytes(path, 10) == bytes(41)
+    monkeypatch.setenv(INPUT_LIMITS, "")
+    assert read_bytes(path, 41) == bytes(41)
+
+
+def test_what_no_factor_allows_names_none(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(bytes(1025))
+    with pytest.raises(OSError, match=r"expected at most 0: '[^']*file'$"):
+        read_bytes(path, 1)
+
+
+@pytest.mark.parametrize("value", ["0", "0.5", "-1", "1025", "nan", "inf", "four", "4x"])
+def test_another_factor_is_refused(
+    value: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").touch()
+    monkeypatch.setenv(INPUT_LIMITS, value)
+    with pytest.raises(InputError, match=f"{INPUT_LIMITS}: expected a number from 1 to 1024"):
+        check_file(tmp_path / "file")
+
+
+def test_more_pixels_can_be_allowed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("airground.io.images.PIXEL_LIMIT", 100)
+    cv2.imwrite(str(tmp_path / "a.png"), np.zeros((12, 13), np.uint8))
+    monkeypatch.delenv(INPUT_LIMITS, raising=False)
+    refused(
+        lambda: read_grey(tmp_path / "a.png", 13, 12),
+        rf"13x12 are more than 100 pixels \({INPUT_LIMITS}=2 allows it\)",
+    )
+    monkeypatch.setenv(INPUT_LIMITS, "2")
+    assert read_grey(tmp_path / "a.png", 13, 12).shape == (12, 13)

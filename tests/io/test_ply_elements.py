@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -90,3 +91,38 @@ def test_elements_that_are_not_there(tmp_path: Path) -> None:
     assert read_elements(tmp_path / "a.ply", ("edge",)) == {}
     with pytest.raises(InputError, match="lacks red"):
         columns(tmp_path, read_elements(tmp_path / "a.ply", ("vertex",))["vertex"], ("x", "red"))
+
+
+@pytest.mark.parametrize("kind", ["ascii", "binary_little_endian"])
+def test_more_rows_than_the_file_can_hold_are_not_read(tmp_path: Path, kind: str) -> None:
+    file = tmp_path / "a.ply"
+    file.write_bytes(mixed(kind, b"0 0 0\n" * 10, vertices=10**9))
+    with pytest.raises(InputError, match=r"is truncated: 1000000000 rows .* there are 60"):
+        read_elements(file, ("vertex",))
+
+
+@pytest.mark.parametrize("kind", ["ascii", "binary_little_endian"])
+@pytest.mark.parametrize("head", ["", "element vertex 4", "element vertex 10"])
+def test_a_sparse_file_is_not_read_whole(tmp_path: Path, kind: str, head: str) -> None:
+    file = tmp_path / "a.ply"
+    start = f"ply\nformat {kind} 1.0\n{head}\n{HEADER}end_header\n" if head else ""
+    file.write_bytes(start.encode())
+    with file.open("r+b") as opened:
+        opened.truncate(7 << 30)
+    tracemalloc.start()
+    with pytest.raises(InputError, match=r"no PLY file|has more after|more than \d+ bytes"):
+        read_elements(file, ("vertex",))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 16 << 20
+
+
+def test_a_row_without_end_and_empty_lines_at_the_end(tmp_path: Path) -> None:
+    file = tmp_path / "a.ply"
+    file.write_bytes(ASCII + b"\n \r\n\n")
+    assert len(read_elements(file, ("vertex", "face"))["face"]) == 2
+    file.write_bytes(ASCII.replace(b"\n", b"\r\n"))
+    assert len(read_elements(file, ("vertex", "face"))["face"]) == 2
+    file.write_bytes(ASCII + b"\n 1")
+    with pytest.raises(InputError, match="has more after"):
+        read_elements(file, ("vertex", "face"))

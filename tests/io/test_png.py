@@ -163,3 +163,60 @@ def test_other_kinds_are_left_to_opencv(tmp_path: Path) -> None:
     palette.save(file)
     expected = np.asarray(palette.convert("RGB"))
     np.testing.assert_array_equal(read_colour(file, image.shape[1], image.shape[0]), expected)
+
+
+@pytest.mark.parametrize("bits", [1, 2, 4])
+@pytest.mark.parametrize("interlaced", [False, True])
+def test_grey_of_few_bits_and_interlaced(tmp_path: Path, bits: int, interlaced: bool) -> None:
+    """As OpenCV decodes them: 0 is black, the largest value white."""
+    level = np.arange(24, dtype=np.uint8).reshape(4, 6) % 2**bits
+    if interlaced:  # one pixel, which all passes but the first leave out
+        level = level[:1, 1:2]
+    rows = np.packbits(
+        np.unpackbits(level[..., None], axis=2)[..., -bits:].reshape(len(level), -1), 1
+    )
+    raw = b"".join(b"\0" + row.tobytes() for row in rows)
+    height, width = level.shape
+    size = struct.pack(">IIBBBBB", width, height, bits, 0, 0, 0, int(interlaced))
+    chunks = (b"IHDR", size), (b"IDAT", zlib.compress(raw)), (b"IEND", b"")
+    file = tmp_path / "grey.png"
+    file.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(map(chunk, chunks)))
+    expected = cv2.imread(str(file), cv2.IMREAD_UNCHANGED)
+    np.testing.assert_array_equal(read_grey(file, width, height), expected)
+    np.testing.assert_array_equal(expected, level * (255 // (2**bits - 1)))
+
+
+def chunk(one: tuple[bytes, bytes]) -> bytes:
+    body = b"".join(one)
+    return struct.pack(">I", len(one[1])) + body + struct.pack(">I", zlib.crc32(body))
+
+
+@pytest.mark.parametrize("kind", [(1, 3), (16, 2), (8, 6), (2, 0), (16, 4)])
+def test_what_is_wrong_with_another_kind_is_not_written_to_the_screen(
+    kind: tuple[int, int], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    size = struct.pack(">IIBBBBB", 6, 4, *kind, 0, 0, 0)
+    chunks = (b"IHDR", size), (b"IDAT", zlib.compress(bytes([9]) * 40)), (b"IEND", b"")
+    file = tmp_path / "a.png"
+    file.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(map(chunk, chunks)))
+    with pytest.raises(RecordingError) as caught:
+        read_grey(file, 6, 4)
+    assert "\n" not in str(caught.value)
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("colour", [False, True])
+def test_interlaced_images(tmp_path: Path, colour: bool) -> None:
+    """Adam7 by hand: each pass is a small image."""
+    shape = (9, 11, 3) if colour else (9, 11)
+    image = np.random.default_rng(0).integers(0, 256, shape, np.uint8)
+    starts = [(0, 0, 8, 8), (0, 4, 8, 8), (4, 0, 8, 4), (0, 2, 4, 4), (2, 0, 4, 2)]
+    starts += [(0, 1, 2, 2), (1, 0, 2, 1)]
+    passes = [image[y::dy, x::dx] for y, x, dy, dx in starts]
+    raw = b"".join(b"\0" + row.tobytes() for one in passes if one.size for row in one)
+    size = struct.pack(">IIBBBBB", 11, 9, 8, 2 if colour else 0, 0, 0, 1)
+    chunks = (b"IHDR", size), (b"IDAT", zlib.compress(raw)), (b"IEND", b"")
+    file = tmp_path / "a.png"
+    file.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(map(chunk, chunks)))
+    read = read_colour if colour else read_grey
+    np.testing.assert_array_equal(read(file, 11, 9), image)

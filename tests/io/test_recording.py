@@ -144,7 +144,7 @@ BROKEN = {
     ),
     "negative focal length": (
         lambda p: edit(p / "recording.toml", "fx = 20.0", "fx = -20.0"),
-        r"calibration\.mav\.camera\.fx.*greater than 0",
+        r"calibration\.mav\.camera\.fx.*greater than or equal to 1",
     ),
     "principal point outside": (
         lambda p: edit(p / "recording.toml", "cx = 11.5", "cx = 40.0"),

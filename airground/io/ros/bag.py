@@ -20,7 +20,9 @@ from rosbags.typesys.store import Typestore
 
 from airground.core.arrays import I64
 from airground.errors import RecordingError
+from airground.io.folder_links import check_links
 from airground.io.input_files import SETTINGS_LIMIT, check_file
+from airground.io.ros.inflating import bound_inflating
 
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 TRANSFORMS_DEFINITION = "geometry_msgs/TransformStamped[] transforms"
@@ -58,6 +60,7 @@ class Bag:
         self._types = _types(self._is_ros1)
         try:
             _check_files(path)
+            bound_inflating()
             self._reader: Any = Reader1(path) if self._is_ros1 else Reader2(path)
             self._reader.open()
             topics = self._reader.topics.items()
@@ -172,6 +175,7 @@ def _check_files(path: Path) -> None:
         if path.suffix == ".bag":
             _check_begin(path)
         return
+    check_links(path)
     check_file(path / "metadata.yaml", SETTINGS_LIMIT)
     for file in path.iterdir():
         check_file(file, BAG_LIMIT)

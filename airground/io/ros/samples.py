@@ -14,6 +14,7 @@ from airground.core.messages import ImuNoise, ImuSamples, MagneticSamples
 from airground.core.se3 import SE3
 from airground.errors import RecordingError
 from airground.io.lens import Lens
+from airground.io.plausibility import check_field
 from airground.io.ros.bag import Bag
 from airground.io.sensor_file import checked_lens
 
@@ -71,7 +72,9 @@ def read_imu(bag: Bag, topic: str) -> tuple[ImuSamples, str]:
 def read_magnetic(bag: Bag, topic: str) -> MagneticSamples:
     """All samples of the magnetic field [T]; raises RecordingError."""
     stamps, rows, _ = _vectors(bag, topic, "magnetic_field")
-    return MagneticSamples(stamps, rows)
+    samples = MagneticSamples(stamps, rows)
+    check_field(samples, Path(f"{bag.path}: {topic}"))
+    return samples
 
 
 def read_lens(bag: Bag, topic: str, image_topic: str) -> Lens:

@@ -11,6 +11,7 @@ from typing import Annotated
 from pydantic import Field, StringConstraints, ValidationError
 
 from airground.errors import InputError
+from airground.io.folder_links import check_links
 from airground.io.input_files import read_toml_text
 from evaluation.setup.checked_json import Part
 from evaluation.table.answer_file import ENDINGS, Answers, read_answers
@@ -53,6 +54,7 @@ def read_submission(folder: Path, recordings: Collection[str]) -> Submission:
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder; expected one file of poses per recording")
+    check_links(folder)
     about = _about(folder / ABOUT)
     runs = sorted(
         (path for path in folder.iterdir() if path.is_dir() and RUN.fullmatch(path.name)),

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 
 from airground.errors import InputError
@@ -29,6 +30,16 @@ def test_an_unreadable_table_is_one_clear_error(tmp_path: Path, content: bytes |
     path = tmp_path / "results.parquet"
     if content is not None:
         path.write_bytes(content)
+    with pytest.raises(InputError, match=r"results\.parquet: no readable results table"):
+        ResultTable.read(path)
+
+
+def test_damaged_notes_of_pandas_are_one_clear_error(tmp_path: Path) -> None:
+    path = tmp_path / "results.parquet"
+    make_table(sequences=1, conditions=(BEST,)).write(path)
+    notes = pq.read_schema(path).metadata[b"pandas"]
+    damaged = {b"pandas": notes.replace(b"pandas_type", b"pandas_tipe")}
+    pq.write_table(pq.read_table(path).replace_schema_metadata(damaged), path)
     with pytest.raises(InputError, match=r"results\.parquet: no readable results table"):
         ResultTable.read(path)
 
