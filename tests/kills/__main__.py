@@ -35,6 +35,7 @@ def main() -> int:
     words.add_argument("--count", type=int, default=12, help="signals to each verb")
     words.add_argument("--seed", type=int, default=0, help="seed of the moments")
     words.add_argument("--signal", choices=SIGNALS, help="only this one, not all in turn")
+    words.add_argument("--keep", type=Path, help="folder for outputs that differ")
     asked = words.parse_args()
     # Ignored, as a shell sets it for what runs in the background, the commands would inherit it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -45,7 +46,7 @@ def main() -> int:
         make_inputs(folder)
         print(f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}", flush=True)
         for verb in asked.verbs:
-            campaign = Campaign(verb, commands(folder)[verb], folder, signals)
+            campaign = Campaign(verb, commands(folder)[verb], folder, signals, asked.keep)
             campaign.run(asked.count, np.random.default_rng([asked.seed, VERBS.index(verb)]))
             print(campaign.row(asked.count), flush=True)
             for fault in campaign.faults:
@@ -62,6 +63,7 @@ class Campaign:
         verb, words: The command.
         folder: Folder of its inputs, and of its outputs.
         signals: Signals that are sent in turn.
+        keep: Folder to which outputs that differ are copied; None for nowhere.
         hits: Signals that met a running process, by signal and role.
         left: Kinds of what was left, each counted once a signal.
         faults: What must not be.
@@ -71,6 +73,7 @@ class Campaign:
     words: tuple[str, ...]
     folder: Path
     signals: list[signal.Signals]
+    keep: Path | None = None
     hits: Counter[tuple[signal.Signals, Role]] = field(default_factory=Counter)
     left: Counter[str] = field(default_factory=Counter)
     faults: list[str] = field(default_factory=list)
@@ -96,7 +99,7 @@ class Campaign:
             if not resumes:
                 if victim.whole():
                     # Killed after its last step, or its worker replaced, it has written all.
-                    wrong = differences(self.verb, good.output(), victim.output())
+                    wrong = self.compare(good, victim, f"{k}")
                     said = f"{number.name}, exit code {code}: the output looks whole, but"
                     self.faults += [f"{said} {one}" for one in wrong]
                 shutil.rmtree(victim.output(), ignore_errors=True)
@@ -105,7 +108,15 @@ class Campaign:
         left_before = victim.beside()
         victim.finish()
         self.check_end(victim, left_before)
-        self.faults += differences(self.verb, good.output(), victim.output())
+        self.faults += self.compare(good, victim, "end")
+
+    def compare(self, good: Command, victim: Command, when: str) -> list[str]:
+        """Differences of two outputs, which are kept if there are any."""
+        wrong = differences(self.verb, good.output(), victim.output())
+        if wrong and self.keep is not None:
+            for one in (good, victim):
+                shutil.copytree(one.output(), self.keep / f"{one.folder.name}-{when}")
+        return wrong
 
     def target(self, k: int, number: signal.Signals) -> Role:
         """Which process gets signal number k."""
