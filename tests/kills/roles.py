@@ -7,8 +7,9 @@ import signal
 from enum import Enum
 from pathlib import Path
 
-OPENGL = ("libEGL", "libOSMesa", "libGLX", "libGL.")
-"""Starts of the names of libraries that only a process that renders has loaded."""
+DRIVERS = ("libEGL_", "libOSMesa", "libgallium", "swrast_dri")
+"""Starts of the names of OpenGL's drivers, which a process loads when it opens a context. The
+libraries before them (`libEGL.so`) are loaded with Open3D too, in processes that draw nothing."""
 
 
 class Role(Enum):
@@ -49,7 +50,7 @@ def role(pid: int, leader: int) -> Role | None:
         return None
     if not words or b"resource_tracker" in words:
         return None
-    return Role.RENDERER if any(f"/{name}" in maps for name in OPENGL) else Role.WORKER
+    return Role.RENDERER if any(f"/{name}" in maps for name in DRIVERS) else Role.WORKER
 
 
 def send(number: signal.Signals, wanted: Role, leader: int, choice: int) -> Role | None:

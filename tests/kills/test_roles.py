@@ -16,7 +16,7 @@ from tests.kills.roles import Role, role, send, session
 
 PARENT = """
 import subprocess, sys, time
-sleep = "import time; print(flush=True); time.sleep(600)"
+sleep = "import open3d, time; print(flush=True); time.sleep(600)"
 draw = "import ctypes; ctypes.CDLL('libOSMesa.so.8'); " + sleep
 tracker = sleep + " # resource_tracker"
 below = [subprocess.Popen([sys.executable, "-c", one], stdout=-1) for one in (sleep, draw, tracker)]
