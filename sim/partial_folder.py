@@ -1,17 +1,19 @@
-"""Output folders that are whole or not there at all, whatever ends the process that writes them."""
+"""Output folders and files that are whole or not there at all, whatever ends the process that
+writes them."""
 
 from __future__ import annotations
 
 import os
-import shutil
-import tempfile
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from airground.core.scratch_folder import locked, remove_abandoned
+from airground.core.leftovers import RANDOM, is_held, named, new_locked, remove_left
 
-SUFFIX = ".partial"
+MARK = ".partial-"
+PARTIAL = rf"\.(?P<name>.+){re.escape(MARK)}{RANDOM}"
+"""Regular expression for the names of unfinished folders and files."""
 
 
 @contextmanager
@@ -19,27 +21,42 @@ def partial_folder(path: Path) -> Iterator[Path]:
     """A hidden folder beside `path`, to be renamed to it when all is written.
 
     It is removed with the block unless it was renamed. A process that was killed leaves its own:
-    the next one that writes the same `path` removes it. A lock tells whether its process lives.
+    the next one that writes the same `path` removes it, and logs that.
 
     Raises:
         OSError: No folder can be made there.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    remove_abandoned(path.parent, f".{_escaped(path.name)}.*{SUFFIX}")
-    folder = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
-    folder.chmod(0o777 & ~_umask())
-    with locked(folder):
-        # Locked before it has the name by which others look for abandoned ones.
-        named = folder.rename(folder.with_name(folder.name + SUFFIX))
-        try:
-            yield named
-        finally:
-            shutil.rmtree(named, ignore_errors=True)
+    remove_left(path.parent, _partial(path))
+    with new_locked(path.parent, f".{path.name}{MARK}", folder=True) as folder:
+        folder.chmod(0o777 & ~_umask())
+        yield folder
 
 
-def _escaped(name: str) -> str:
-    """A name in which `glob` sees no pattern."""
-    return "".join(f"[{letter}]" if letter in "*?[" else letter for letter in name)
+@contextmanager
+def whole_file(path: Path) -> Iterator[Path]:
+    """A hidden empty file beside `path`, which replaces it when the block ends without an error.
+
+    What killed processes leave is removed as by `partial_folder`.
+
+    Raises:
+        OSError: No file can be made there.
+    """
+    remove_left(path.parent, _partial(path))
+    with new_locked(path.parent, f".{path.name}{MARK}", folder=False) as file:
+        file.chmod(0o666 & ~_umask())
+        yield file
+        file.replace(path)
+
+
+def is_being_written(path: Path) -> bool:
+    """Whether a live process has an unfinished folder or file for `path`."""
+    return any(is_held(one) for one in named(path.parent, _partial(path)))
+
+
+def _partial(path: Path) -> str:
+    """Regular expression for the names of what is unfinished of `path`."""
+    return rf"\.{re.escape(path.name)}{re.escape(MARK)}{RANDOM}"
 
 
 def _umask() -> int:

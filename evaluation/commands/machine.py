@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+from tyro.conf import Positional
+
 from airground.errors import InputError
 from evaluation.commands.options import (
     RENDER_S_PER_S,
@@ -140,13 +142,27 @@ class Bench(SensorOption, SeedOption, Verb):
 class Doctor(Verb):
     """Look whether this machine can render and compute, and say what is missing.
 
-    Exits with 3 if something is missing without which nothing works.
+    Exits with 3 if something is missing without which nothing works. With --clean it only removes
+    what killed commands left in FOLDER, in results and datasets directly in it, and among temporary
+    files; what a running process uses, and what the same command continues, is listed and kept.
     """
 
+    folder: Annotated[Positional[Path], Shown("FOLDER", "the current one")] = Path()
+    """folder that --clean looks through"""
+    clean: bool = False
+    """list what killed commands left, with sizes, and remove it"""
+
     def main(self) -> int:
+        from evaluation.commands.leftovers import clean, finding, leftovers, print_leftovers
         from evaluation.setup.doctor import Health, examine, show
 
-        findings = examine()
+        if self.clean:
+            found = leftovers(self.folder)
+            print_leftovers(found, clean(found))
+            return EXIT_OK
+        if self.folder != Path():
+            raise InputError(f"{self.folder}: a folder goes with --clean alone")
+        findings = [*examine(), finding(leftovers(self.folder))]
         show(findings)
-        broken = any(finding.health == Health.BROKEN for finding in findings)
+        broken = any(one.health == Health.BROKEN for one in findings)
         return EXIT_FAULT_FOUND if broken else EXIT_OK

@@ -4,11 +4,7 @@ complete: after an interruption the next call makes only what is missing."""
 
 from __future__ import annotations
 
-import fcntl
 import json
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,14 +14,14 @@ from evaluation.datasets.datasheet import datasheet
 from evaluation.datasets.plan import PLAN, Plan, World
 from evaluation.measure.work.crew import Crew
 from evaluation.setup.checked_json import read_checked
-from evaluation.setup.output import check_free
+from evaluation.setup.output import check_free, continued_folder, write_whole
 from evaluation.setup.progress import step
 from sim.interrupts import end_with_parent
 from sim.recording.recorder import record
 from sim.scene import load_scene
 from sim.sensors.presets import sensor_preset
 
-SHEET, LOCK = "DATASHEET.md", ".lock"
+SHEET = "DATASHEET.md"
 
 
 def make_dataset(plan: Plan, out: Path, jobs: int, threads: int) -> None:
@@ -39,7 +35,7 @@ def make_dataset(plan: Plan, out: Path, jobs: int, threads: int) -> None:
     """
     check_free(out)
     unfinished = out.parent / f".{out.name}.partial"
-    with _held(unfinished):
+    with continued_folder(unfinished):
         _agree(unfinished, plan)
         missing = [w for w in plan.worlds if not (unfinished / w.folder).exists()]
         each = max(1, threads // jobs)
@@ -58,36 +54,20 @@ def make_dataset(plan: Plan, out: Path, jobs: int, threads: int) -> None:
         scenes = [load_scene(scene) for scene in dict.fromkeys(w.scene for w in plan.worlds)]
         sheet = datasheet(out.name, scenes, sensor_preset(plan.sensors), recordings)
         (unfinished / SHEET).write_text(sheet, encoding="utf-8")
-        (unfinished / LOCK).unlink()
         unfinished.rename(out)
 
 
-@contextmanager
-def _held(unfinished: Path) -> Iterator[None]:
-    unfinished.mkdir(parents=True, exist_ok=True)
-    with (unfinished / LOCK).open("w") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise InputError(f"{unfinished}: another process works on it") from None
-        yield
-
-
 def _agree(unfinished: Path, plan: Plan) -> None:
-    """Write the plan, or check that it is the written one; remove incomplete recordings."""
+    """Write the plan, or check that it is the written one."""
     written = unfinished / PLAN
     if not written.exists():
         text = json.dumps(plan.model_dump(), indent=1) + "\n"
-        partial = unfinished / f"{PLAN}.partial"
-        partial.write_text(text, encoding="utf-8")
-        partial.rename(written)
+        write_whole(written, text)
     elif read_checked(Plan, written, "plan of a dataset") != plan:
         raise InputError(
             f"{unfinished}: is the unfinished work of another plan or version; remove it, or "
             "give the same words"
         )
-    for incomplete in unfinished.glob("*/.*.partial"):
-        shutil.rmtree(incomplete)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -20,7 +21,7 @@ from airground.io.layout import HEADER, TRUTH
 from evaluation.judge.score.benchmark import BENCHMARK, Benchmark
 from evaluation.measure.levels.level import Level
 from evaluation.setup.checked_json import read_checked
-from evaluation.setup.output import check_free
+from evaluation.setup.output import check_free, continued_folder
 from evaluation.setup.progress import step
 from sim.partial_folder import partial_folder
 from sim.recording.recorder import Flight, record
@@ -113,8 +114,18 @@ def make_benchmark(
     for folder in folders:
         check_free(folder)
     data, home = (f.with_name(f".{f.name}.partial") for f in (folders[0], folders[-1]))
-    for folder in (data, home):
-        folder.mkdir(parents=True, exist_ok=True)
+    with continued_folder(data), nullcontext() if home == data else continued_folder(home):
+        _record_missing(draw, data, home, workers, make or _recorded)
+        if truth is not None:
+            home.rename(truth)
+        data.rename(out)
+
+
+def _record_missing(
+    draw: Draw, data: Path, home: Path, workers: int, make: Callable[[Flight, Path, int], Path]
+) -> None:
+    """Record what is missing in the unfinished folder `data`; truth goes to `home` if that is
+    another."""
     benchmark = draw.benchmark()
     _agree(benchmark, home)
     missing = [
@@ -126,16 +137,13 @@ def make_benchmark(
     with step("recording", len(benchmark.recordings), "flights", done) as recording:
         for name, tries in missing:
             with partial_folder(data / name) as scratch:
-                whole = _first_possible(tries, scratch / "whole", workers, make or _recorded)
-                if truth is not None:
+                whole = _first_possible(tries, scratch / "whole", workers, make)
+                if home != data:
                     # Of a killed process: without the recording it is worth nothing.
                     shutil.rmtree(home / name, ignore_errors=True)
                     seal(whole, home / name)
                 whole.rename(data / name)
             recording.advance()
-    if truth is not None:
-        home.rename(truth)
-    data.rename(out)
 
 
 def _agree(benchmark: Benchmark, home: Path) -> None:

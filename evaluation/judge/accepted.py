@@ -23,6 +23,7 @@ from evaluation.judge.metrics import WATCHED, Metric
 from evaluation.judge.samples import DIGITS, Flight, Samples, flights
 from evaluation.setup.checked_json import Part, read_checked
 from evaluation.setup.condition import Condition
+from evaluation.setup.output import write_whole
 from evaluation.table.comparison import median
 from evaluation.table.rows import ResultTable
 
@@ -191,12 +192,7 @@ class Accepted(Part):
         """Write one line per flight and metric, so that a diff shows the changes."""
         made = self.model_dump(by_alias=True, mode="json")
         lines = json.dumps(made, indent=1, allow_nan=False, ensure_ascii=False)
-        partial = path.with_name(f".{path.name}.partial")
-        try:
-            partial.write_text(_compact(lines) + "\n", encoding="utf-8")
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
+        write_whole(path, _compact(lines) + "\n")
 
     @classmethod
     def read(cls, path: Path) -> Accepted:

@@ -54,7 +54,14 @@ def start_logging(verbose: bool, file: Path | None = None) -> None:
     each step and its time; InputError if that is not possible."""
     from rich.logging import RichHandler
 
-    handler = RichHandler(console=stderr(), show_path=False, show_time=verbose)
+    handler: logging.Handler
+    if stderr().is_terminal:
+        handler = RichHandler(console=stderr(), show_path=False, show_time=verbose)
+    else:
+        # Rich breaks lines at 80 columns there, paths included.
+        handler = logging.StreamHandler()
+        moment = "%(asctime)s " if verbose else ""
+        handler.setFormatter(logging.Formatter(f"{moment}%(levelname)-8s %(message)s"))
     logging.basicConfig(level=logging.WARNING, format="%(message)s", handlers=[handler], force=True)
     level = logging.DEBUG if verbose else logging.INFO
     handler.setLevel(level)

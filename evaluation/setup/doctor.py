@@ -7,12 +7,12 @@ import platform
 import shutil
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
+from airground.core.scratch_folder import ScratchFolder
 from evaluation.setup.environment import usable_cores
 from evaluation.setup.system_libraries import SYSTEM_LIBRARIES
 
@@ -174,8 +174,8 @@ def _found(
 
 def _try(script: str, **environment: str) -> tuple[bool, str]:
     """Whether a Python script runs, in a process of its own, and its last line."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "attempt.py"
+    with ScratchFolder() as scratch:
+        file = scratch.path / "attempt.py"
         file.write_text(script, encoding="utf-8")
         try:
             done = subprocess.run(

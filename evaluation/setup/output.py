@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+from airground.core.leftovers import locked, remove_left
 from airground.errors import InputError
-from sim.partial_folder import partial_folder
+from sim.partial_folder import PARTIAL, is_being_written, partial_folder, whole_file
 
 
 @contextmanager
@@ -18,7 +20,8 @@ def fresh_folder(path: Path) -> Iterator[Path]:
     SIGKILL the next one with that `path`.
 
     Raises:
-        InputError: `path` exists already, or its parent cannot hold a folder.
+        InputError: `path` exists already, another process is writing it, or its parent cannot hold
+            a folder.
         OSError: Writing failed; the error names a file.
     """
     check_free(path)
@@ -29,8 +32,7 @@ def fresh_folder(path: Path) -> Iterator[Path]:
             raise InputError(f"--out {path}: cannot create it ({error.strerror})") from error
         try:
             yield partial
-            check_free(path)
-            partial.rename(path)
+            _take_place(partial, path)
         except OSError as error:
             # A full disk is noticed while writing, where the error does not name the file.
             if error.errno is not None and error.filename is None:
@@ -38,14 +40,51 @@ def fresh_folder(path: Path) -> Iterator[Path]:
             raise
 
 
-def check_free(path: Path) -> None:
-    """Refuse an output folder that exists, before any work is done.
+@contextmanager
+def continued_folder(path: Path) -> Iterator[None]:
+    """Make an unfinished folder, or go on in the one that an earlier run left, and keep other
+    processes from it during the block; it stays, and may be renamed.
 
     Raises:
-        InputError: `path` exists.
+        InputError: Another process works in it.
+        OSError: It cannot be made.
     """
+    path.mkdir(parents=True, exist_ok=True)
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(locked(path))
+        except (BlockingIOError, FileNotFoundError):
+            raise InputError(f"{path}: another process works on it") from None
+        for folder in (path, *path.glob("*/")):
+            remove_left(folder, PARTIAL)
+        yield
+
+
+def check_free(path: Path) -> None:
+    """Refuse an output folder that exists or is being written, before any work is done.
+
+    Raises:
+        InputError: `path` exists, or a live process has an unfinished folder for it.
+    """
+    _check_absent(path)
+    if is_being_written(path):
+        raise InputError(f"--out {path}: another run is writing it; name another folder")
+
+
+def _check_absent(path: Path) -> None:
     if path.exists() or path.is_symlink():
         raise InputError(f"--out {path}: exists already; name a new folder, or remove this one")
+
+
+def _take_place(partial: Path, path: Path) -> None:
+    """Give a finished folder its name; InputError if another process was faster."""
+    _check_absent(path)
+    try:
+        partial.rename(path)
+    except OSError as error:
+        if error.errno in (errno.ENOTEMPTY, errno.EEXIST):
+            _check_absent(path)
+        raise
 
 
 def check_new_file(path: Path, option: str) -> None:
@@ -61,14 +100,14 @@ def check_new_file(path: Path, option: str) -> None:
 
 
 def write_whole(path: Path, text: str) -> None:
-    """Write a new file: whole, or not at all.
+    """Write a file, or replace it: whole, or not at all.
 
     Raises:
         OSError: Writing failed; the error names a file.
     """
-    partial = path.with_name(f".{path.name}.partial")
     try:
-        partial.write_text(text, encoding="utf-8")
-        partial.rename(path)
-    finally:
-        partial.unlink(missing_ok=True)
+        with whole_file(path) as partial:
+            partial.write_text(text, encoding="utf-8")
+    except OSError as error:
+        # The name of the unfinished file says nothing to its user.
+        raise OSError(error.errno, error.strerror, str(path)) from error

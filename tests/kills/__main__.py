@@ -13,75 +13,148 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from tests.kills.commands import RESUMING, SAME, commands, make_inputs
-from tests.kills.victim import Command, digest
+from tests.kills.commands import RESUMING, VERBS, commands, make_inputs
+from tests.kills.roles import Role
+from tests.kills.same import differences
+from tests.kills.victim import Command, Left
 
-SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
+SIGNALS = ("KILL", "TERM", "INT")
+TARGETS = (Role.PARENT, Role.WORKER, Role.RENDERER)
+"""Those of SIGKILL, in turn; SIGTERM goes to the parent, and Ctrl-C to all as a terminal's does."""
+COLUMNS = ("verb", "signals", "while it ran: SIGKILL", "SIGTERM", "Ctrl-C", "left", "lost")
 
 
 def main() -> int:
     words = argparse.ArgumentParser(prog="python -m tests.kills", description=__doc__)
-    words.add_argument("verbs", nargs="*", default=list(SAME), help=", ".join(SAME))
-    words.add_argument("--count", type=int, default=12, help="kills of each verb")
+    words.add_argument("verbs", nargs="*", default=list(VERBS), help=", ".join(VERBS))
+    words.add_argument("--count", type=int, default=12, help="signals to each verb")
     words.add_argument("--seed", type=int, default=0, help="seed of the moments")
+    words.add_argument("--signal", choices=SIGNALS, help="only this one, not all in turn")
+    words.add_argument("--keep", type=Path, help="folder for outputs that differ")
     asked = words.parse_args()
     # Ignored, as a shell sets it for what runs in the background, the commands would inherit it.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    signals = [signal.Signals[f"SIG{name}"] for name in SIGNALS if asked.signal in (None, name)]
     lost = 0
     with tempfile.TemporaryDirectory(prefix="airground-kills-") as name:
         folder = Path(name)
         make_inputs(folder)
-        print("| verb | kills | while it ran | left after a kill | lost |\n|---|---|---|---|---|")
+        print(f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}", flush=True)
         for verb in asked.verbs:
-            lost += kill_often(verb, commands(folder)[verb], folder, asked.count, asked.seed)
+            campaign = Campaign(verb, commands(folder)[verb], folder, signals, asked.keep)
+            campaign.run(asked.count, np.random.default_rng([asked.seed, VERBS.index(verb)]))
+            print(campaign.row(asked.count), flush=True)
+            for fault in campaign.faults:
+                print(f"  {fault}", file=sys.stderr, flush=True)
+            lost += len(campaign.faults)
     return int(lost > 0)
 
 
-def kill_often(verb: str, words: tuple[str, ...], folder: Path, count: int, seed: int) -> int:
-    """Kill a verb `count` times, print a row of the table; returns the number of failures."""
-    rng = np.random.default_rng([seed, sorted(SAME).index(verb)])
-    good = Command(words, made(folder / f"{verb}-good"))
-    whole_s = good.finish()
-    expected = digest(good.output(), SAME[verb])
-    victim = Command(words, made(folder / verb))
-    left: Counter[str] = Counter()
-    faults, hits, resumes = [], 0, False
-    for k in range(count):
-        number = SIGNALS[k % len(SIGNALS)]
-        child = k if k % 4 == 3 and number is signal.SIGKILL else None
-        began_s = time.monotonic()
-        code, after = victim.kill(float(rng.uniform(0.2, 1.0)) * whole_s, number, child)
-        hits += code != 0
-        if code == 0 and not resumes:
-            # The first run of all may have compiled kernels: moments are those of one that did not.
-            whole_s = min(whole_s, time.monotonic() - began_s)
-        for kind, names in vars(after).items():
-            left[kind] += bool(names)
-        for one in after.temporary:
-            print(f"{verb}, {number.name}: left {one} in TMPDIR", file=sys.stderr, flush=True)
-        faults += [f"{number.name}: process {one} stays" for one in after.processes]
-        faults += [f"{number.name}: shared memory {one} stays" for one in after.shared]
-        resumes = code != 0 and verb in RESUMING
-        if not resumes:
-            # Killed after its last step, a command has written all of it.
-            if victim.whole() and digest(victim.output(), SAME[verb]) != expected:
-                faults.append(f"{number.name}: exit code {code}, but the output looks whole")
-            shutil.rmtree(victim.output(), ignore_errors=True)
-    faults += ["no signal came while it ran"] if count and not hits else []
-    victim.finish()
-    beside = {path.name for path in victim.folder.iterdir()} - {"tmp", "stderr", victim.out}
-    faults += [f"{one} stays after a whole run" for one in beside | victim.temporary()]
-    same = digest(victim.output(), SAME[verb]) == expected
-    faults += [] if same else ["the bytes differ from a run without kills"]
-    said = ", ".join(f"{kind.replace('_', ' ')} {n}" for kind, n in left.items() if n) or "nothing"
-    print(f"| {verb} | {count} | {hits} | {said} | {len(faults)} |", flush=True)
-    for fault in faults:
-        print(f"  {fault}", file=sys.stderr)
-    return len(faults)
+@dataclass
+class Campaign:
+    """Signals to one verb, and what they left.
+
+    Attributes:
+        verb, words: The command.
+        folder: Folder of its inputs, and of its outputs.
+        signals: Signals that are sent in turn.
+        keep: Folder to which outputs that differ are copied; None for nowhere.
+        hits: Signals that met a running process, by signal and role.
+        left: Kinds of what was left, each counted once a signal.
+        faults: What must not be.
+    """
+
+    verb: str
+    words: tuple[str, ...]
+    folder: Path
+    signals: list[signal.Signals]
+    keep: Path | None = None
+    hits: Counter[tuple[signal.Signals, Role]] = field(default_factory=Counter)
+    left: Counter[str] = field(default_factory=Counter)
+    faults: list[str] = field(default_factory=list)
+
+    def run(self, count: int, rng: np.random.Generator) -> None:
+        """Signal the command `count` times, then let it end."""
+        good = Command(self.words, made(self.folder / f"{self.verb}-good"))
+        whole_s = good.finish()
+        victim = Command(self.words, made(self.folder / self.verb))
+        resumes = False
+        for k in range(count):
+            number = self.signals[k % len(self.signals)]
+            began_s = time.monotonic()
+            code, hit, left = victim.kill(
+                float(rng.uniform(0.1, 1.0)) * whole_s, number, self.target(k, number), k
+            )
+            if hit is None and not resumes:
+                # The first run of all may have compiled kernels: moments are those of one that
+                # did not.
+                whole_s = min(whole_s, time.monotonic() - began_s)
+            self.note(number, hit, left)
+            resumes = self.verb in RESUMING and victim.whole() and code != 0
+            if not resumes:
+                if victim.whole():
+                    # Killed after its last step, or its worker replaced, it has written all.
+                    wrong = self.compare(good, victim, f"{k}")
+                    said = f"{number.name}, exit code {code}: the output looks whole, but"
+                    self.faults += [f"{said} {one}" for one in wrong]
+                shutil.rmtree(victim.output(), ignore_errors=True)
+        if count and not self.hits:
+            self.faults.append("no signal came while it ran")
+        left_before = victim.beside()
+        victim.finish()
+        self.check_end(victim, left_before)
+        self.faults += self.compare(good, victim, "end")
+
+    def compare(self, good: Command, victim: Command, when: str) -> list[str]:
+        """Differences of two outputs, which are kept if there are any."""
+        wrong = differences(self.verb, good.output(), victim.output())
+        if wrong and self.keep is not None:
+            for one in (good, victim):
+                shutil.copytree(one.output(), self.keep / f"{one.folder.name}-{when}")
+        return wrong
+
+    def target(self, k: int, number: signal.Signals) -> Role:
+        """Which process gets signal number k."""
+        if number is signal.SIGKILL:
+            return TARGETS[k // len(self.signals) % len(TARGETS)]
+        return Role.GROUP if number is signal.SIGINT else Role.PARENT
+
+    def note(self, number: signal.Signals, hit: Role | None, left: Left) -> None:
+        """Count a signal, and what it left."""
+        if hit is not None:
+            self.hits[number, hit] += 1
+        for kind, names in vars(left).items():
+            self.left[kind] += bool(names)
+        for one in left.temporary:
+            print(f"{self.verb}, {number.name}: left {one} in TMPDIR", file=sys.stderr, flush=True)
+        self.faults += [f"{number.name}: process {one} stays" for one in left.processes]
+        self.faults += [f"{number.name}: shared memory {one} stays" for one in left.shared]
+        if number is not signal.SIGKILL:
+            self.faults += [f"{number.name}: {one} stays" for one in left.half_written]
+
+    def check_end(self, victim: Command, left_before: set[str]) -> None:
+        """After a whole run nothing is left beside its output, and it has said what was."""
+        left = victim.beside() | victim.temporary()
+        self.faults += [f"{one} stays after a whole run" for one in left]
+        said = victim.errors().read_text("utf-8", "replace")
+        self.faults += [f"{one} was removed silently" for one in left_before if one not in said]
+
+    def row(self, count: int) -> str:
+        """The row of the table."""
+        hits = [self.by_role(one) for one in (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)]
+        left = [f"{kind.replace('_', ' ')} {n}" for kind, n in self.left.items() if n]
+        cells = [self.verb, str(count), *hits, ", ".join(left) or "nothing", str(len(self.faults))]
+        return f"| {' | '.join(cells)} |"
+
+    def by_role(self, number: signal.Signals) -> str:
+        """How often a signal met which process: "parent 3, worker 2"."""
+        counts = [f"{role.value} {self.hits[number, role]}" for role in Role]
+        return ", ".join(one for one in counts if not one.endswith(" 0")) or "none"
 
 
 def made(folder: Path) -> Path:

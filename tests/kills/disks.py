@@ -20,8 +20,9 @@ from pathlib import Path
 import numpy as np
 
 from evaluation.setup import console
-from tests.kills.commands import RESUMING, SAME, commands, make_inputs
-from tests.kills.victim import Command, digest
+from tests.kills.commands import RESUMING, VERBS, commands, make_inputs
+from tests.kills.same import differences
+from tests.kills.victim import Command
 
 TROUBLES = ("full", "read-only", "vanishes")
 ROOM, SPARE_BYTES = 3, 512 << 20
@@ -31,7 +32,7 @@ it, a flight's painted world among them."""
 
 def main() -> int:
     words = argparse.ArgumentParser(prog="python -m tests.kills.disks", description=__doc__)
-    words.add_argument("verbs", nargs="*", default=list(SAME), help=", ".join(SAME))
+    words.add_argument("verbs", nargs="*", default=list(VERBS), help=", ".join(VERBS))
     words.add_argument("--count", type=int, default=5, help="times of each trouble and verb")
     words.add_argument("--seed", type=int, default=0, help="seed of sizes and moments")
     asked = words.parse_args()
@@ -47,7 +48,7 @@ def main() -> int:
 
 def try_often(verb: str, folder: Path, count: int, seed: int) -> int:
     """Print a row for each trouble; returns the number of failures."""
-    rng = np.random.default_rng([seed, sorted(SAME).index(verb)])
+    rng = np.random.default_rng([seed, sorted(VERBS).index(verb)])
     good = Command(commands(folder)[verb], folder / f"{verb}-good")
     good.folder.mkdir()
     good.finish()
@@ -69,8 +70,7 @@ def try_often(verb: str, folder: Path, count: int, seed: int) -> int:
                 remount(disk, f"rw,size={ROOM * need + SPARE_BYTES}")
                 if code != 0:
                     victim.finish()
-                if digest(victim.output(), SAME[verb]) != digest(good.output(), SAME[verb]):
-                    faults.append("the bytes differ from a run with room")
+                faults += differences(verb, good.output(), victim.output())
         print(f"| {verb} | {trouble} | {count} | {refused} | {len(faults)} |", flush=True)
         for fault in faults:
             print(f"  {fault}", file=sys.stderr, flush=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import signal
 import subprocess
@@ -11,12 +10,18 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.kills.roles import Role, name_of, send, session
+
 SHARED = Path("/dev/shm")
 NAMES = ("psm_*", "sem.*")
 """Names that Python gives to shared memory and semaphores; other programs have others."""
 MAIN = "from evaluation.cli import main; main()"
 END_S = 20.0
 """Longest time until the processes of a killed command have ended [s]."""
+LONGEST_S = 1800.0
+"""Longest time of a command, on a busy machine [s]."""
+KEPT = "airground-*-*.lock"
+"""Lock files of compiling, which stay among temporary files."""
 
 
 @dataclass(frozen=True)
@@ -60,44 +65,47 @@ class Command:
         assert code == 0, f"exit code {code}: {self.errors().read_text()[-500:]}"
         return time.monotonic() - started
 
-    def kill(self, after_s: float, number: signal.Signals, child: int | None) -> tuple[int, Left]:
-        """Send a signal to the command, or to one of its children, after a time.
+    def kill(
+        self, after_s: float, number: signal.Signals, wanted: Role, choice: int
+    ) -> tuple[int, Role | None, Left]:
+        """Send a signal to a process of the command, after a time.
 
         Args:
             after_s: Time from its start [s].
             number: The signal.
-            child: Which child gets it, counted round; None for the command itself.
+            wanted: Role of the process that gets it, if there is one at that time.
+            choice: Which of several processes of that role, counted round.
 
         Returns:
-            Exit code, and what is left when all has ended.
+            Exit code, the role that got the signal (None: it had ended), and what is left when all
+            processes have ended.
         """
-        before, scratch = shared_names(), self.temporary()
+        before, scratch, unfinished = shared_names(), self.temporary(), self.beside()
         process = self.start()
+        hit = None
         try:
             process.wait(after_s)
         except subprocess.TimeoutExpired:
-            target = process.pid
-            below = [pid for pid in session(process.pid) if pid != process.pid]
-            if child is not None and below:
-                target = below[child % len(below)]
-            if target in session(process.pid):
-                os.kill(target, number)
-        code = process.wait(600)
+            hit = send(number, wanted, process.pid, choice)
+        code = process.wait(LONGEST_S)
         end = time.monotonic() + END_S
         while session(process.pid) and time.monotonic() < end:
             time.sleep(0.05)
         processes = tuple(name_of(pid) for pid in session(process.pid))
         for pid in session(process.pid):
             os.kill(pid, signal.SIGKILL)
-        shared = shared_names() - before
-        temporary = self.temporary() - scratch
-        beside = {path.name for path in self.folder.iterdir()} - {"tmp", "stderr", self.out}
-        return code, Left(processes, tuple(shared), tuple(temporary), tuple(beside))
+        new = (shared_names() - before, self.temporary() - scratch, self.beside() - unfinished)
+        return code, hit, Left(processes, *map(tuple, new))
+
+    def beside(self) -> set[str]:
+        """Names beside its output."""
+        return {path.name for path in self.folder.iterdir()} - {"tmp", "stderr", self.out}
 
     def temporary(self) -> set[str]:
         """Names in its folder of temporary files, which stay for its next run."""
         folder = self.folder / "tmp"
-        return {path.name for path in folder.iterdir()} if folder.exists() else set()
+        every = folder.iterdir() if folder.exists() else ()
+        return {path.name for path in every if not path.match(KEPT)}
 
     def whole(self) -> bool:
         return self.output().exists()
@@ -112,35 +120,3 @@ class Command:
 
 def shared_names() -> set[str]:
     return {path.name for pattern in NAMES for path in SHARED.glob(pattern)}
-
-
-def session(leader: int) -> list[int]:
-    """Live processes of the session that a process leads."""
-    found = []
-    for path in Path("/proc").iterdir():
-        if path.name.isdigit():
-            try:
-                state, _, _, number = (
-                    path.joinpath("stat").read_text().rpartition(")")[2].split()[:4]
-                )
-            except (OSError, ValueError):
-                continue
-            if int(number) == leader and state != "Z":
-                found.append(int(path.name))
-    return sorted(found)
-
-
-def name_of(pid: int) -> str:
-    try:
-        return Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode()[:100]
-    except OSError:
-        return "ended"
-
-
-def digest(folder: Path, only: tuple[str, ...]) -> str:
-    """Digest of the names and bytes of files with these endings; all without any."""
-    made = hashlib.sha256()
-    for path in sorted(folder.rglob("*")):
-        if path.is_file() and (not only or path.name.endswith(only)):
-            made.update(str(path.relative_to(folder)).encode() + b"\0" + path.read_bytes())
-    return made.hexdigest()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from sim.partial_folder import partial_folder
+from sim.partial_folder import is_being_written, partial_folder, whole_file
 
 WRITES_FOR_EVER = """
 import sys, time
@@ -70,14 +70,46 @@ def test_what_a_living_process_writes_stays(tmp_path: Path) -> None:
         with partial_folder(out) as ours:
             assert set(tmp_path.iterdir()) == {theirs, ours}
         assert (theirs / "half").read_text() == "half"
+        assert is_being_written(out)
+        assert not is_being_written(tmp_path / "ou")
     finally:
         process.kill()
         process.wait()
+    assert not is_being_written(out)
 
 
 def test_other_names_are_left_alone(tmp_path: Path) -> None:
-    others = [tmp_path / ".out2.x.partial", tmp_path / ".out.partial", tmp_path / "out.x.partial"]
+    names = (".out2.partial-aaaaaaaa", ".out.partial", "out.partial-aaaaaaaa", ".out.partial-a")
+    others = [tmp_path / name for name in names]
     for other in others:
         other.mkdir()
     with partial_folder(tmp_path / "out"):
         assert all(other.exists() for other in others)
+
+
+def test_a_file_is_replaced_when_whole(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    for text in ("first", "second"):
+        (tmp_path / ".file.partial-killed__").write_text("half")
+        with whole_file(file) as partial:
+            partial.write_text(text)
+            assert set(tmp_path.iterdir()) == {partial, *([file] if text == "second" else [])}
+        assert list(tmp_path.iterdir()) == [file]
+        assert file.read_text() == text
+    (tmp_path / "plain").touch()
+    assert file.stat().st_mode == (tmp_path / "plain").stat().st_mode
+
+
+def test_a_file_stays_as_it_was_after_an_error(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    file.write_text("first")
+
+    def fail() -> None:
+        with whole_file(file) as partial:
+            partial.write_text("half")
+            raise RuntimeError
+
+    with pytest.raises(RuntimeError):
+        fail()
+    assert list(tmp_path.iterdir()) == [file]
+    assert file.read_text() == "first"

@@ -12,6 +12,7 @@ from airground.errors import InputError
 from airground.io.layout import HEADER, TRUTH
 from evaluation.setup.checked_json import Count, Part, read_checked
 from evaluation.setup.level_mark import LevelMark
+from evaluation.setup.output import write_whole
 
 BENCHMARK = "benchmark.json"
 
@@ -28,9 +29,7 @@ class Benchmark(Part):
 
     def write(self, folder: Path) -> None:
         text = self.model_dump_json(by_alias=True, indent=1) + "\n"
-        partial = folder / f"{BENCHMARK}.partial"
-        partial.write_text(text, encoding="utf-8")
-        partial.rename(folder / BENCHMARK)
+        write_whole(folder / BENCHMARK, text)
 
 
 def recordings_in(truth: Path) -> list[Path]:

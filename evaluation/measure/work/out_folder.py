@@ -9,8 +9,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+from airground.core.leftovers import log_removed, remove_left, size_bytes
 from airground.errors import InputError
 from evaluation.measure.work.unit import UnitStore
+from sim.partial_folder import PARTIAL
 
 UNITS, RECORDINGS = "units", "recordings"
 SCRATCH, RESULTS, LOCK = ".scratch", ".results", ".lock"
@@ -60,9 +62,7 @@ def resumable_folder(path: Path) -> Iterator[OutFolder]:
         _take(lock.fileno(), path)
         scratch, results, recordings = path / SCRATCH, path / RESULTS, path / RECORDINGS
         try:
-            # Left over from a killed run.
-            for folder in (scratch, results, *recordings.glob(".*.partial")):
-                shutil.rmtree(folder, ignore_errors=True)
+            _remove_left(path)
             scratch.mkdir()
             results.mkdir()
             yield OutFolder(path, UnitStore(path / UNITS), scratch, results, recordings)
@@ -78,6 +78,16 @@ def resumable_folder(path: Path) -> Iterator[OutFolder]:
                 shutil.rmtree(folder, ignore_errors=True)
             if new:
                 _remove_if_unused(path)
+
+
+def _remove_left(path: Path) -> None:
+    """Remove what a killed run left in a folder whose lock is held."""
+    left = [folder for folder in (path / SCRATCH, path / RESULTS) if folder.is_dir()]
+    size = sum(map(size_bytes, left))
+    for folder in left:
+        shutil.rmtree(folder, ignore_errors=True)
+    log_removed(left, size)
+    remove_left(path / RECORDINGS, PARTIAL)
 
 
 def _is_ours(path: Path) -> bool:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
-import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from airground.core.leftovers import remove_left
 from airground.errors import InputError
 from airground.io import layout
 from airground.io.digests import bytes_digest, file_digest
@@ -19,6 +18,7 @@ from evaluation.measure.showcase import Showcase
 from evaluation.measure.work.code_version import code_version
 from evaluation.setup.setups import Setup
 from evaluation.table.rows import ResultTable
+from sim.partial_folder import PARTIAL, partial_folder
 from sim.recording.recorder import Flight
 
 KEY_LENGTH = 32
@@ -135,7 +135,6 @@ def _described(recording: Path | Flight) -> dict[str, Any]:
 
 
 ROWS, MADE_FROM, SHOWCASE = "rows.parquet", "made_from.json", "showcase"
-_PARTIAL = ".partial-"
 
 
 @dataclass(frozen=True)
@@ -164,8 +163,7 @@ class UnitStore:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         folder.mkdir(parents=True, exist_ok=True)
-        for partial in folder.glob(f"{_PARTIAL}*"):
-            shutil.rmtree(partial)
+        remove_left(folder, PARTIAL)
 
     def __contains__(self, key: str) -> bool:
         return (self._folder / key).is_dir()
@@ -182,23 +180,21 @@ class UnitStore:
     def write(self, key: str, made_from: dict[str, Any], finished: Finished) -> None:
         """Store the results of a unit, on the disk when this returns; raises OSError and stores
         nothing if writing failed, as on a full disk."""
-        partial = Path(tempfile.mkdtemp(prefix=_PARTIAL, dir=self._folder))
         try:
-            finished.table.write(partial / ROWS)
-            text = json.dumps(made_from, indent=2, sort_keys=True) + "\n"
-            (partial / MADE_FROM).write_text(text, encoding="utf-8")
-            if finished.showcase is not None:
-                finished.showcase.save(partial / SHOWCASE)
-            for path in [*partial.rglob("*"), partial]:
-                _flush(path)
-            partial.rename(self._folder / key)
+            with partial_folder(self._folder / key) as partial:
+                finished.table.write(partial / ROWS)
+                text = json.dumps(made_from, indent=2, sort_keys=True) + "\n"
+                (partial / MADE_FROM).write_text(text, encoding="utf-8")
+                if finished.showcase is not None:
+                    finished.showcase.save(partial / SHOWCASE)
+                for path in [*partial.rglob("*"), partial]:
+                    _flush(path)
+                partial.rename(self._folder / key)
             _flush(self._folder)
         except OSError as error:
             if error.errno is not None and error.filename is None:
                 raise OSError(error.errno, error.strerror, str(self._folder / key)) from error
             raise
-        finally:
-            shutil.rmtree(partial, ignore_errors=True)
 
 
 def _flush(path: Path) -> None:

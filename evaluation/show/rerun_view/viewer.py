@@ -18,6 +18,7 @@ import rerun_cli
 
 from airground.errors import AirgroundError, InputError
 from evaluation.setup.output import check_new_file
+from sim.partial_folder import whole_file
 
 LOOPBACK = "127.0.0.1"
 START_S = 30.0
@@ -107,13 +108,9 @@ def save(file: Path, out: Path) -> None:
         InputError: `file` is no recording of rerun, or `out` exists or cannot be written.
     """
     check_new_file(out, "--save")
-    partial = out.with_name(f".{out.name}.partial")
-    try:
+    with whole_file(out) as partial:
         _carry_out("rrd", "optimize", str(file), "-o", str(partial))
         verify(partial)
-        partial.rename(out)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def verify(file: Path) -> None:

@@ -23,6 +23,7 @@ from evaluation.datasets.collection import make_dataset
 from evaluation.datasets.datasheet import datasheet
 from evaluation.datasets.plan import Plan, parse_seeds, parse_split, plan_dataset
 from evaluation.measure.work.crew import Crew
+from evaluation.setup.output import continued_folder
 from sim.recording.recorder import record
 from sim.scene import load_scene
 from sim.sensors.presets import NOMINAL
@@ -107,7 +108,7 @@ def test_what_was_made_is_not_made_again(made: Made, tmp_path: Path) -> None:
     assert len(made) == 3
     assert not (tmp_path / "out").exists()
     unfinished = tmp_path / ".out.partial"
-    (unfinished / "train" / ".flat_s1.x.partial").mkdir(parents=True)
+    (unfinished / "train" / ".flat_s1.partial-aaaaaaaa").mkdir(parents=True)
     with pytest.raises(InputError, match="unfinished work of another plan"):
         make_dataset(plan, tmp_path / "out", 1, 1)
     (unfinished / "dataset.json").write_text(plan.model_dump_json())
@@ -123,7 +124,7 @@ def test_what_was_made_is_not_made_again(made: Made, tmp_path: Path) -> None:
 
 def test_two_do_not_work_on_one_dataset(made: Made, tmp_path: Path) -> None:
     with (
-        collection._held(tmp_path / ".out.partial"),
+        continued_folder(tmp_path / ".out.partial"),
         pytest.raises(InputError, match="another process works on it"),
     ):
         make_dataset(plan_of(1, {}), tmp_path / "out", 1, 1)
@@ -228,4 +229,4 @@ def test_a_killed_dataset_is_finished_by_the_next_call(tmp_path: Path) -> None:
     again = record(load_scene(str(scene)), 2, NOMINAL, tmp_path / "again", workers=1)
     digests = [Recording.open(path).header.digests for path in (again, recordings[2])]
     assert digests[0] == digests[1]
-    assert not list(tmp_path.rglob("*.partial"))
+    assert not list(tmp_path.rglob("*.partial*"))

@@ -29,7 +29,7 @@ def fail_without_the_folder(out: Path, records: bool) -> None:
     with resumable_folder(out) as folder:
         shutil.rmtree(out)
         if records:
-            (folder.recordings / ".a.partial").mkdir(parents=True)
+            (folder.recordings / ".a.partial-aaaaaaaa").mkdir(parents=True)
         raise OSError("gone")
 
 
@@ -85,6 +85,23 @@ def test_a_folder_that_vanished_hides_no_error(tmp_path: Path) -> None:
     assert not out.exists()
 
 
+def test_what_a_killed_run_left_is_removed_and_logged(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    out = tmp_path / "out"
+    with resumable_folder(out) as folder:
+        folder.store.write("key", {}, FOUND)
+    left = [".scratch", ".results", "recordings/.a.partial-aaaaaaaa", "units/.b.partial-bbbbbbbb"]
+    for name in left:
+        (out / name / "deep").mkdir(parents=True)
+    with caplog.at_level("INFO", "airground"), resumable_folder(out) as folder:
+        assert "key" in folder.store
+    said = " ".join(caplog.messages)
+    for name in left:
+        assert str(out / name) in said
+        assert not (out / name).exists()
+
+
 def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
     out = tmp_path / "out"
     with resumable_folder(out) as folder:
@@ -99,7 +116,7 @@ def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
 def test_partial_files_of_a_killed_run_are_removed(tmp_path: Path) -> None:
     store = UnitStore(tmp_path)
     store.write("whole", {"a": 1}, FOUND)
-    half = tmp_path / ".partial-x"
+    half = tmp_path / ".key.partial-aaaaaaaa"
     half.mkdir()
     (half / "rows.parquet").write_bytes(b"PAR1")
     again = UnitStore(tmp_path)

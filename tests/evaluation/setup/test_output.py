@@ -3,12 +3,30 @@
 from __future__ import annotations
 
 import errno
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from airground.errors import InputError
+from evaluation.setup import console
+from evaluation.setup.output import check_free, fresh_folder, write_whole
+
+WRITES = """
+import sys, time
+from pathlib import Path
+from evaluation.setup import console
 from evaluation.setup.output import fresh_folder
+def work():
+    with fresh_folder(Path(sys.argv[1])) as folder:
+        for name in "abc":
+            (folder / name).write_text(sys.argv[2])
+            time.sleep(0.005)
+print(flush=True)
+sys.stdin.readline()
+sys.exit(console.run(work))
+"""
 
 
 def test_it_appears_when_whole(tmp_path: Path) -> None:
@@ -66,3 +84,47 @@ def test_a_full_disk_gets_a_name(tmp_path: Path) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
     assert error.value.errno == errno.ENOSPC
     assert list(tmp_path.iterdir()) == []
+
+
+def test_of_two_processes_at_once_one_writes_all(tmp_path: Path) -> None:
+    for attempt in range(5):
+        out = tmp_path / str(attempt)
+        pair = [
+            subprocess.Popen(
+                [sys.executable, "-c", WRITES, str(out), name],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+            )
+            for name in ("first", "second")
+        ]
+        for process in pair:
+            assert process.stdout is not None
+            process.stdout.readline()
+        for process in pair:
+            assert process.stdin is not None
+            process.stdin.write("\n")
+            process.stdin.flush()
+        said = [process.communicate()[1] for process in pair]
+        codes = [process.returncode for process in pair]
+        assert sorted(codes) == [console.EXIT_OK, console.EXIT_ERROR]
+        (line,) = said[codes.index(console.EXIT_ERROR)].splitlines()
+        assert line.startswith(f"airground: error: --out {out}: ")
+        assert len({(out / name).read_text() for name in "abc"}) == 1
+        assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".")] == []
+
+
+def test_what_another_process_is_writing_is_refused_before_any_work(tmp_path: Path) -> None:
+    with fresh_folder(tmp_path / "out"):
+        with pytest.raises(InputError, match="another run is writing it"):
+            check_free(tmp_path / "out")
+        check_free(tmp_path / "ou")
+    with pytest.raises(InputError, match="exists already"):
+        check_free(tmp_path / "out")
+
+
+def test_a_file_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError) as error:
+        write_whole(tmp_path / "missing" / "file", "text")
+    assert error.value.filename == str(tmp_path / "missing" / "file")
