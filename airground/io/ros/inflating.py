@@ -6,7 +6,6 @@ The library takes its decompressors from tables of its modules, which `bound_inf
 from __future__ import annotations
 
 import bz2
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache, partial
@@ -20,11 +19,8 @@ from rosbags.rosbag2 import storage_mcap
 
 from airground.io.input_limits import how_to_raise, raised
 
-if sys.version_info >= (3, 14):
-    from compression import zstd
-else:
-    from backports import zstd
-
+zstd = storage_mcap.zstd
+"""The module of Python 3.14, or what stands for it in versions before."""
 CHUNK_LIMIT = 256 << 20
 """Largest chunk or message once it is inflated [byte]: that of an image; most have about 1 MiB."""
 FILE_RATIO = 100
