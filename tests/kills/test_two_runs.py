@@ -15,8 +15,8 @@ from tests.kills.same import differences
 from tests.kills.victim import Command
 
 pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.subject("evaluation", "sim", "airground", "tests/kills"),
+    pytest.mark.slow(minutes=1),
+    pytest.mark.subject("evaluation", "sim", "airground"),
 ]
 LONGEST_S = 900
 SHORT = ("export", "run")
