@@ -43,16 +43,18 @@ docs: $(READY)
 	$(PYTHON_IN_VENV) docs/metrics.py
 	.venv/bin/sphinx-build -W --keep-going -q -b html docs results/docs
 
-# Did a change make it worse? Against evaluation/accepted.json; docs/check_a_change.md.
-# RESUME=1 uses what OUT has of the same sources. Recordings (8 GiB) are kept until the simulator
+# Did a change make it worse? Each suite against its accepted figures; docs/check_a_change.md.
+# RESUME=1 uses what OUT has of the same sources. Recordings (24 GiB) are kept until the simulator
 # changes; RECORDINGS=DIR keeps them elsewhere, RECORDINGS= keeps none.
 regression: OUT = results/regression
+regression: SUITES = fast hard faults
 regression: RECORDINGS = $(shell scripts/kept_recordings results)
 regression: $(READY)
 	$(if $(RESUME),,rm -rf $(OUT))
-	.venv/bin/airground reproduce --suite fast --out $(OUT) \
-		$(if $(RECORDINGS),--recordings '$(RECORDINGS)',--render)
-	.venv/bin/airground check $(OUT)
+	code=0; for suite in $(SUITES); do \
+		.venv/bin/airground reproduce --suite $$suite --out $(OUT)/$$suite \
+			$(if $(RECORDINGS),--recordings '$(RECORDINGS)',--render) && \
+		.venv/bin/airground check $(OUT)/$$suite || code=$$?; done; exit $$code
 
 # Damaged inputs by the thousand: docs/reliability.md.
 fuzz: N = 10000

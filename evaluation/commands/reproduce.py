@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from evaluation.measure.levels.level import Level
     from evaluation.measure.plans.reproduce import Plan
     from evaluation.measure.protocol.trials import Protocol
+    from evaluation.measure.suite import SuiteName
     from sim.recording.recorder import Flight
 
 
@@ -102,8 +103,9 @@ class Reproduce(
 
     quick: Annotated[bool, _SMALLER] = False
     """one small scene and a short flight: minutes instead of hours"""
-    suite: Annotated[Literal["fast"] | None, _SMALLER, Shown("fast")] = None
-    """the fixed small suite for check, with the setup asked for only"""
+    suite: Annotated[Literal["fast", "hard", "faults"] | None, _SMALLER, Shown("NAME")] = None
+    """a fixed small suite for check (docs/check_a_change.md), with the setup asked for only: fast,
+    hard or faults"""
     level: Annotated[
         Literal["paper", "easy", "medium", "hard", "extreme"] | None, _SMALLER, Shown("NAME")
     ] = None
@@ -153,11 +155,12 @@ class Reproduce(
                 summary = write_results(results, folder.results)
         print_summary(summary)
 
-    def _suite(self, name: str) -> Plan:
-        from evaluation.measure.plans.suite import SUITES
+    def _suite(self, name: SuiteName) -> Plan:
+        from evaluation.measure.suite import SUITES
         from evaluation.setup.settings import ProtocolCounts
         from sim.sensors.presets import sensor_preset
 
+        suite = SUITES[name]
         for field in ("budget", "scenes", "flights", "sequences"):
             if getattr(self, field):
                 raise InputError(f"--{field}: the suite {name} is fixed; give it without --suite")
@@ -165,8 +168,13 @@ class Reproduce(
             raise InputError(f"--alone: the suite {name} has one setup anyway; leave it out")
         if self.settings().protocol != ProtocolCounts():
             raise InputError(f"section protocol: the suite {name} is fixed")
-        sensors = sensor_preset(self.sensors or FULL.sensors)
-        return SUITES[name].plan(self.setup(), sensors, self.checked_seed())
+        if suite.sensors is not None and self.sensors:
+            raise InputError(f"--sensors: the suite {name} fixes it; give it without --suite")
+        if suite.heading is not None:
+            self._refuse_heading(f"the suite {name}", "--suite")
+        setup = (self if suite.heading is None else replace(self, north=suite.heading)).setup()
+        sensors = sensor_preset(suite.sensors or self.sensors or FULL.sensors)
+        return suite.plan(setup, sensors, self.checked_seed())
 
     def plan(self) -> Plan:
         """What the words ask for, checked."""
@@ -194,16 +202,21 @@ class Reproduce(
 
         if self.level is None:
             return None
-        fixed: dict[str, object] = {
-            "scenes": self.scenes,
-            "sensors": self.sensors,
+        for word, given in {"scenes": self.scenes, "sensors": self.sensors}.items():
+            if given:
+                raise InputError(f"--{word}: level {self.level} fixes it; give it without --level")
+        self._refuse_heading(f"level {self.level}", "--level")
+        return load_level(self.level)
+
+    def _refuse_heading(self, what: str, option: str) -> None:
+        """Raise InputError if words say where the heading comes from, which `what` fixes."""
+        asked = {
             "heading": self.north,
             "set localization.heading": self.sets("localization.heading"),
         }
-        for word, given in fixed.items():
+        for word, given in asked.items():
             if given:
-                raise InputError(f"--{word}: level {self.level} fixes it; give it without --level")
-        return load_level(self.level)
+                raise InputError(f"--{word}: {what} fixes it; give it without {option}")
 
     def _flights(self, extent: Extent, level: Level | None) -> list[Flight]:
         from evaluation.measure.plans.reproduce import flights_over

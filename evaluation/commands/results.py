@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,6 +17,16 @@ if TYPE_CHECKING:
     from evaluation.judge.accepted import Measured
 
 ACCEPTED = Path(__file__).parents[1] / "accepted.json"
+"""Accepted figures of the suite `fast`; those of another one are beside it."""
+
+
+def accepted_file(results: Path) -> Path:
+    """Where the accepted figures of the suite are that a run's folder holds."""
+    from evaluation.judge.results import read_table
+
+    conditions = read_table(results).conditions()
+    suite = re.fullmatch("suite ([a-z]+)", conditions[0].variant if conditions else "")
+    return ACCEPTED if suite is None else ACCEPTED.with_stem(f"accepted_{suite[1]}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,7 +95,7 @@ class Check(Verb):
 
     results: Annotated[Positional[Path], Shown("RESULTS")]
     """folder that run or reproduce has written"""
-    against: Annotated[Path, Shown("FILE", "evaluation/accepted.json")] = ACCEPTED
+    against: Annotated[Path | None, Shown("FILE", "the accepted figures of the suite")] = None
     """file that accept has written, or folder of other results"""
     markdown: Annotated[Path | None, Shown("FILE")] = None
     """write the table for a pull request"""
@@ -101,22 +112,22 @@ class Check(Verb):
         from evaluation.judge.verdict import Verdict, compare
         from evaluation.show.comparison import verdict_json, verdict_table
 
-        self._check_level()
-        before = self._reference()
+        against = self.against or accepted_file(self.results)
+        before = self._reference(against)
         try:
             after = Measured.of(read_table(self.results), before.condition)
             comparison = compare(before, after)
         except InputError as error:
-            if self.against != ACCEPTED:
+            if self.against is not None:
                 raise
             hint = "these are the accepted results of the suite; --against names others"
             raise InputError(f"{error} ({hint})") from None
         verdict_table.print_comparison(comparison)
-        if self.against.is_dir():
+        if against.is_dir():
             from evaluation.show.rerun_view.differences import hold_folders, print_worsened
 
-            helds = hold_folders(self.against, self.results, ACCEPTED)
-            print_worsened(comparison, helds, self.against, self.results)
+            helds = hold_folders(against, self.results, ACCEPTED)
+            print_worsened(comparison, helds, against, self.results)
         for file, written in (
             (self.markdown, verdict_table.markdown),
             (self.junit, verdict_table.junit),
@@ -127,22 +138,16 @@ class Check(Verb):
                 file.write_text(written(comparison), encoding="utf-8")
         return EXIT_WORSE if comparison.of(Verdict.WORSE) else EXIT_OK
 
-    def _check_level(self) -> None:
-        """Results of another level are no reference."""
-        from evaluation.judge.results import read_level
+    def _reference(self, against: Path) -> Measured:
+        """The figures in a file or folder; results of another level are no reference."""
+        from evaluation.judge.accepted import Accepted, Measured
+        from evaluation.judge.results import read_level, read_table
         from evaluation.setup.level_mark import check_same_level
 
-        if self.against.is_dir():
-            here = str(self.results)
-            check_same_level(read_level(self.against), read_level(self.results), here)
-
-    def _reference(self) -> Measured:
-        from evaluation.judge.accepted import Accepted, Measured
-        from evaluation.judge.results import read_table
-
-        if self.against.is_dir():
-            return Measured.of(read_table(self.against))
-        return Accepted.read(self.against).measured()
+        if not against.is_dir():
+            return Accepted.read(against).measured()
+        check_same_level(read_level(against), read_level(self.results), str(self.results))
+        return Measured.of(read_table(against))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,7 +162,7 @@ class Accept(Verb):
     """folder that run or reproduce has written"""
     reason: Annotated[str, Shown("TEXT")]
     """why these figures are right; kept with them"""
-    to: Annotated[Path, Shown("FILE", "evaluation/accepted.json")] = ACCEPTED
+    to: Annotated[Path | None, Shown("FILE", "the accepted figures of the suite")] = None
     """file to keep them in"""
 
     def main(self) -> None:
@@ -167,9 +172,10 @@ class Accept(Verb):
         from evaluation.judge.results import SUMMARY, read_table
         from evaluation.judge.summary import Summary
 
-        before = Accepted.read(self.to) if self.to.exists() else None
+        file = self.to or accepted_file(self.results)
+        before = Accepted.read(file) if file.exists() else None
         measured = Measured.of(read_table(self.results))
         revision = Summary.read(self.results / SUMMARY).git_revision
         today = datetime.now(UTC).date()
-        Accepted.of(measured, revision, self.reason, before, today).write(self.to)
-        print(f"{self.to}: accepted {measured.suite}, measured at {revision}")
+        Accepted.of(measured, revision, self.reason, before, today).write(file)
+        print(f"{file}: accepted {measured.suite}, measured at {revision}")

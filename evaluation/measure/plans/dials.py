@@ -194,6 +194,7 @@ DIALS = (
     _failing("dropped_s", "dropped", "each robot's camera drops its images"),
     _failing("black_s", "black", "each robot's camera gives black images"),
     _failing("frozen_s", "frozen", "each robot's camera repeats its last image with new stamps"),
+    _failing("repeated_s", "repeated", "each robot's camera gives every second image twice"),
     _failing("overexposed_s", "exposure", "light is four times as bright for each robot's camera"),
     _failing("depth_gone_s", "depth_gone", "the ground robot's depth images have no depth"),
     _failing("imu_gap_s", "imu_gap", "each robot's IMU misses its samples"),

@@ -1,51 +1,90 @@
-"""Success against level: results of several levels of difficulty beside each other."""
+"""Success against level: every method at several levels of difficulty beside each other."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from evaluation.judge.claims import TO_BE_FOUND, localization_claims
 from evaluation.judge.metrics import METRICS
-from evaluation.judge.readings import rate
+from evaluation.judge.readings import median, rate
 from evaluation.judge.results import AtLevel
-from evaluation.setup.text import MISSING, TextTable
-from evaluation.show.figures.style import COLUMN_IN, SERIES, ReportFigure, styled
-from evaluation.table.intervals import Rate
+from evaluation.measure.baselines.table import BASELINES
+from evaluation.setup.text import MISSING, TextTable, metres, milliseconds
+from evaluation.show.figures.style import COLUMN_IN, SERIES, WIDE_IN, ReportFigure, styled
+from evaluation.show.report.baselines import baseline_trials
+from evaluation.table.intervals import Rate, quantile, wilson
+from evaluation.table.limits import FOURTH_MAP, LOCATED_M
 from evaluation.table.rows import ResultTable
 
 SUCCESS = METRICS["within_25cm_4"]
 PRESETS = ("best", "paper", "paper_literal")
+PER_MAP = ("cost_map", "particles")
+"""Stages of ours that work once an aerial map."""
+
+
+@dataclass(frozen=True)
+class Achieved:
+    """What a method achieved at a level.
+
+    Attributes:
+        success: Best guesses within 0.25 m of the truth.
+        error_m: Median horizontal error of the best guess [m]; infinite where most have none.
+        wrong: Claims beyond that, of all claims.
+        ms: Median time per aerial map [ms].
+    """
+
+    success: Rate
+    error_m: float
+    wrong: Rate
+    ms: float
+
+    def text(self) -> str:
+        """The cell of a table."""
+        wrong = f"wrong claims: {self.wrong.successes} of {self.wrong.total}"
+        median_error = f"{metres(self.error_m)}, {milliseconds(self.ms)} ms"
+        return f"{self.success.text()}\n{median_error}\n{wrong}"
 
 
 def level_table(levels: Sequence[AtLevel]) -> TextTable:
-    """One row per level, one column per preset on its own SLAM; no rows for fewer than two levels.
-    Each cell: sequences within 0.25 m after four maps, and wrong claims below."""
+    """One row per method, one column per level; no rows for fewer than two levels. Presets have had
+    four aerial maps, baselines one; the poses are from SLAM."""
     if len(levels) < 2:
         return TextTable((), ())
-    presets = _presets(levels)
-    rows = [(str(one.level), *(_cell(_of(one, preset)) for preset in presets)) for one in levels]
-    return TextTable(("level", *presets), tuple(rows))
+    header = ("method", "aerial maps", *(str(one.level) for one in levels))
+    presets = [(name, [_of_preset(one, name) for one in levels]) for name in PRESETS]
+    rivals = [(b.title, [_of_baseline(one, b.name) for one in levels]) for b in BASELINES]
+    rows = [(name, str(FOURTH_MAP), *_cells(found)) for name, found in presets if any(found)]
+    rows += [(title, "1", *_cells(found)) for title, found in rivals if any(found)]
+    return TextTable(header, tuple(rows))
 
 
 @styled
 def level_figures(levels: Sequence[AtLevel]) -> list[ReportFigure]:
-    """The same as a figure with intervals; none for fewer than two levels."""
+    """Success of presets and of baselines, with intervals; none for fewer than two levels."""
     if len(levels) < 2:
         return []
+    rivals = {b.title: [_of_baseline(one, b.name) for one in levels] for b in BASELINES}
+    rivals = {title: found for title, found in rivals.items() if any(found)}
+    return [_presets_figure(levels), *([_rivals_figure(levels, rivals)] if rivals else [])]
+
+
+def _presets_figure(levels: Sequence[AtLevel]) -> ReportFigure:
     figure = Figure(figsize=(COLUMN_IN, 2.6), layout="constrained")
     axes = figure.subplots()
-    presets = _presets(levels)
-    for index, (preset, colour) in enumerate(zip(presets, SERIES, strict=False)):
-        tables = [_of(one, preset) for one in levels]
-        rates = [(place, rate(SUCCESS, t)) for place, t in enumerate(tables) if t is not None]
-        places = np.array([place for place, _ in rates]) + 0.08 * (index - (len(presets) - 1) / 2)
-        shares = np.array([100 * found.share for _, found in rates])
-        ends = np.array([[100 * found.low, 100 * found.high] for _, found in rates]).T
-        spans = np.abs(ends - shares)
-        axes.errorbar(places, shares, spans, color=colour, marker="o", capsize=2, label=preset)
+    made = {name: [_of_preset(one, name) for one in levels] for name in PRESETS}
+    made = {name: found for name, found in made.items() if any(found)}
+    for index, ((preset, found), colour) in enumerate(zip(made.items(), SERIES, strict=False)):
+        shift = 0.08 * (index - (len(made) - 1) / 2)
+        places, shares, spans = _bars(found)
+        axes.errorbar(
+            places + shift, shares, spans, color=colour, marker="o", capsize=2, label=preset
+        )
     axes.set_xticks(range(len(levels)), [str(one.level) for one in levels])
     axes.set(ylim=(-3, 103), ylabel=f"{SUCCESS.title} [%]")
     axes.legend()
@@ -53,25 +92,79 @@ def level_figures(levels: Sequence[AtLevel]) -> list[ReportFigure]:
         f"Sequences {SUCCESS.title} at each level, poses from SLAM, with 95 % Wilson intervals; "
         "docs/levels.md says what makes each level."
     )
-    return [ReportFigure("levels", "Success against level", caption, figure, wide=False)]
+    return ReportFigure("levels", "Success against level", caption, figure, wide=False)
 
 
-def _presets(levels: Sequence[AtLevel]) -> list[str]:
-    return [name for name in PRESETS if any(_of(one, name) is not None for one in levels)]
+def _rivals_figure(
+    levels: Sequence[AtLevel], rivals: dict[str, list[Achieved | None]]
+) -> ReportFigure:
+    figure = Figure(figsize=(WIDE_IN, 0.6 + 0.26 * len(rivals)), layout="constrained")
+    axes = figure.subplots()
+    colours = colormaps["viridis"](np.linspace(0.85, 0.0, len(levels)))  # harder is darker
+    for row, found in enumerate(rivals.values()):
+        places, shares, spans = _bars(found)
+        for level, share, span in zip(places.astype(int), shares, spans.T, strict=True):
+            at = row + 0.12 * (level - (len(levels) - 1) / 2)
+            axes.errorbar(
+                share, at, xerr=span[:, None], color=colours[level], marker="o", capsize=2
+            )
+    for level, one in enumerate(levels):
+        axes.errorbar([], [], color=colours[level], marker="o", label=str(one.level))
+    axes.set_yticks(range(len(rivals)), list(rivals))
+    axes.invert_yaxis()
+    axes.set(xlim=(-3, 103), xlabel=f"best guess within {LOCATED_M:g} m after one aerial map [%]")
+    axes.legend()
+    caption = (
+        "All methods after one aerial map at each level, with 95 % Wilson intervals. What each is "
+        "given is in the table of baselines."
+    )
+    return ReportFigure("levels_rivals", "Rivals against level", caption, figure, wide=True)
 
 
-def _of(one: AtLevel, preset: str) -> ResultTable | None:
-    """The rows of a preset on its own SLAM: those of its first condition."""
+def _bars(
+    found: Sequence[Achieved | None],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """(N,) levels where something was measured, (N,) success and (2, N) its bars [%]."""
+    there = [(place, one.success) for place, one in enumerate(found) if one is not None]
+    shares = np.array([100 * success.share for _, success in there])
+    ends = np.array([[100 * success.low, 100 * success.high] for _, success in there]).T
+    return np.array([float(place) for place, _ in there]), shares, np.abs(ends - shares)
+
+
+def _cells(found: Sequence[Achieved | None]) -> list[str]:
+    return [MISSING if one is None else one.text() for one in found]
+
+
+def _of_preset(one: AtLevel, preset: str) -> Achieved | None:
+    """What a preset achieved on its own SLAM: in the rows of its first condition."""
     for condition in one.table.conditions():
         if (condition.preset, condition.poses) == (preset, "slam"):
-            return one.table.of(condition).scored()
+            table = one.table.of(condition).scored()
+            claims = localization_claims(table).get(TO_BE_FOUND)
+            wrong = wilson(0, 0) if claims is None else claims.wrong
+            ms = sum(quantile(table.values("timing", stage), 0.5) for stage in PER_MAP)
+            error_m = median(METRICS["localization_4"], table)
+            return Achieved(rate(SUCCESS, table), error_m, wrong, ms)
     return None
 
 
-def _cell(table: ResultTable | None) -> str:
-    if table is None:
-        return MISSING
-    claims = localization_claims(table).get(TO_BE_FOUND)
-    wrong: Rate | None = None if claims is None else claims.wrong
-    below = "" if wrong is None else f"\nwrong claims: {wrong.successes} of {wrong.total}"
-    return rate(SUCCESS, table).text() + below
+def _of_baseline(one: AtLevel, name: str) -> Achieved | None:
+    """What a baseline achieved beside the first condition under which it was tried."""
+    for condition in one.table.conditions():
+        found = _achieved(one.table.of(condition).scored(), name)
+        if found is not None:
+            return found
+    return None
+
+
+def _achieved(table: ResultTable, name: str) -> Achieved | None:
+    trials = baseline_trials(table, name)
+    if trials.empty:
+        return None
+    near, claimed = trials["horizontal_m"] <= LOCATED_M, trials["claimed"] > 0
+    return Achieved(
+        wilson(int(near.sum()), len(trials)),
+        quantile(trials["horizontal_m"], 0.5),
+        wilson(int((claimed & ~near).sum()), int(claimed.sum())),
+        quantile(trials["ms"], 0.5),
+    )

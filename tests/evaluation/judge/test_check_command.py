@@ -11,6 +11,7 @@ import pytest
 from rich.console import Console
 
 from evaluation import cli
+from evaluation.commands import results as commands
 from evaluation.judge.accepted import Measured
 from evaluation.judge.metrics import WATCHED
 from evaluation.judge.summary import build_summary
@@ -58,6 +59,24 @@ def test_the_same_results_pass(accepted: Path, capsys: pytest.CaptureFixture[str
     results = accepted.with_name("accepted")
     assert exit_code("check", results, "--against", accepted) == console.EXIT_OK
     assert "No difference seen" in capsys.readouterr().out
+
+
+def test_a_suite_is_held_against_its_own_figures(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(commands, "ACCEPTED", tmp_path / "accepted.json")
+    frames = {"fast": make_results(SEEDS).frame, "hard": make_results(SEEDS).frame}
+    frames["hard"]["variant"] = "suite hard"
+    runs = {name: write(ResultTable(frame), tmp_path / name) for name, frame in frames.items()}
+    for name, run in runs.items():
+        assert exit_code("accept", run, "--reason", f"first figures of {name}") == 0
+    kept = {"accepted.json": "", "accepted_hard.json": "suite hard"}
+    for name, variant in kept.items():
+        assert json.loads((tmp_path / name).read_text())["condition"]["variant"] == variant
+    frames["hard"].loc[frames["hard"]["metric"] == "error_median_m", "value"] *= 1.4
+    worse = write(ResultTable(frames["hard"]), tmp_path / "worse")
+    capsys.readouterr()
+    assert [exit_code("check", run) for run in (*runs.values(), worse)] == [0, 0, 1]
 
 
 def test_worse_results_fail_and_are_reported_in_three_forms(accepted: Path, tmp_path: Path) -> None:

@@ -8,10 +8,11 @@ from pathlib import Path
 from airground.config import Config
 from evaluation.judge.results import AtLevel, Results, merged
 from evaluation.setup.level_mark import LevelMark
+from evaluation.setup.text import MISSING
 from evaluation.show.report.levels import level_figures, level_table
 from evaluation.show.report.page import write_results
-from evaluation.table.rows import ResultTable
-from tests.evaluation.judge.flights import make_results
+from evaluation.table.rows import ResultTable, Row
+from tests.evaluation.judge.flights import CONDITION, make_results
 
 MARKS = [LevelMark(name=name, version=1) for name in ("easy", "hard")]
 
@@ -29,13 +30,54 @@ def test_success_falls_from_level_to_level() -> None:
     assert both.level is None
     assert [one.level for one in both.levels] == MARKS
     made = level_table(both.levels)
-    assert made.header == ("level", "best")
-    assert [row[0] for row in made.rows] == ["easy 1", "hard 1"]
-    assert made.rows[0][1].startswith("100")
-    assert made.rows[1][1].startswith("0")
-    assert "wrong claims: 0 of" in made.rows[0][1]
+    assert made.header == ("method", "aerial maps", "easy 1", "hard 1")
+    ((method, maps, easy, hard),) = made.rows
+    assert (method, maps) == ("best", "4")
+    assert easy.startswith("100")
+    assert hard.startswith("0")
+    assert "wrong claims: 0 of" in easy
     (figure,) = level_figures(both.levels)
     assert figure.name == "levels"
+
+
+def rivals(mark: LevelMark, near: int, trials: int = 8) -> ResultTable:
+    """A baseline that claims all its guesses, of which so many are right."""
+    condition = replace(CONDITION, variant="" if mark.name == "easy" else f"level {mark}")
+    return ResultTable.from_rows(
+        Row("tiny", 0, 0, condition, "baseline", f"sift_{metric}", value, "", trial=trial)
+        for trial in range(trials)
+        for metric, value in (
+            ("claimed", 1.0),
+            ("horizontal_m", 0.1 if trial < near else 2.0),
+            ("translation_m", 0.1),
+            ("rotation_deg", 1.0),
+            ("ms", 40.0),
+        )
+    )
+
+
+def test_baselines_are_held_against_levels_too() -> None:
+    levels = []
+    for mark, near in zip(MARKS, (8, 2), strict=True):
+        result = results_at(mark, 1.0)
+        levels.append(AtLevel(mark, ResultTable.concat([result.table, rivals(mark, near)])))
+    rows = {row[0]: row[1:] for row in level_table(levels).rows}
+    maps, easy, hard = rows["SIFT and PnP"]
+    assert maps == "1"
+    assert easy.splitlines()[0].startswith("100")
+    assert easy.splitlines()[2:] == ["0.10 m, 40.0 ms", "wrong claims: 0 of 8"]
+    assert hard.splitlines()[0].startswith("25")
+    assert hard.splitlines()[2:] == ["2.00 m, 40.0 ms", "wrong claims: 6 of 8"]
+    assert [figure.name for figure in level_figures(levels)] == ["levels", "levels_rivals"]
+
+
+def test_what_was_not_measured_at_a_level_is_left_open() -> None:
+    easy, hard = (results_at(mark, 1.0) for mark in MARKS)
+    table = ResultTable.concat([hard.table, rivals(MARKS[1], 2)])
+    levels = [AtLevel(MARKS[0], easy.table), AtLevel(MARKS[1], table)]
+    (row,) = [row for row in level_table(levels).rows if row[0] == "SIFT and PnP"]
+    assert row[2] == MISSING
+    assert len(level_figures(levels)) == 2
 
 
 def test_runs_of_one_level_are_one_row_and_need_no_table() -> None:
