@@ -85,8 +85,8 @@ _CONTROL = Flights("flat", 1, 24.0)
 """Nothing to find: every claimed position is wrong."""
 
 _HARD = load_level("hard")
-# The robot of `tiny` sees up to half of it as it sets off, so less overlap is impossible.
-_HARD_DIALS = _HARD.dials | {"scene.overlap": 0.58, "scene.changed": 0.15}
+# 0.40 to 0.48 are seen over `tiny` as the robot sets off (seeds 0 to 11), 0.71 to 0.85 in the end.
+_HARD_DIALS = _HARD.dials | {"scene.overlap": 0.52, "scene.changed": 0.15}
 
 _FAULTS = (
     {"sensors.dropped_s": 1.0},
