@@ -65,18 +65,19 @@ class Suite:
         flights: list[Flight] = []
         for some in self.flights:
             subject = turned(Subject(load_scene(some.scene), sensors, Config()), some.dials)
-            for _ in range(some.count):
-                number = SEEDS_APART * seed + flown[some.scene]
-                dials = some.dials or None
-                where = (subject.scene, number, 0, subject.sensors, some.duration_s, dials)
-                flights.append(Flight(*where))
-                flown[some.scene] += 1
-        return Plan(
-            flights,
-            [replace(setup, variant=self.variant or setup.variant)],
-            self.protocol,
-            negatives=False,
-        )
+            for number in range(flown[some.scene], flown[some.scene] + some.count):
+                flight = Flight(
+                    subject.scene,
+                    SEEDS_APART * seed + number,
+                    0,
+                    subject.sensors,
+                    some.duration_s,
+                    some.dials or None,
+                )
+                flights.append(flight)
+            flown[some.scene] += some.count
+        named = replace(setup, variant=self.variant or setup.variant)
+        return Plan(flights, [named], self.protocol, negatives=False)
 
 
 # Verdicts look at aerial maps 1 and 4.
