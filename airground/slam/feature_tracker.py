@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Self
+
 import numpy as np
 
 from airground.core.arrays import F32, F64, I64, U8, Floats, Mask
@@ -11,6 +13,10 @@ from airground.slam.optical_flow import flow
 from airground.slam.sparse_map import SparseMap
 
 NOTHING = np.empty((0, 2), np.float32)
+PATIENCE = 2
+"""A point that fits the pose badly in this many images in a row is given up."""
+GUIDED_LEVELS, UNGUIDED_LEVELS = 1, 3
+"""Pyramid levels above the image, with a gyro and without: prediction by a gyro is better."""
 
 
 class FeatureTracker:
@@ -31,6 +37,11 @@ class FeatureTracker:
         self._window_px = window_px
         self._levels = levels
         self.clear()
+
+    @classmethod
+    def guided(cls, window_px: int, by_gyro: bool) -> Self:
+        """A tracker whose expected pixels are predicted by a gyro, or by the motion before."""
+        return cls(window_px, GUIDED_LEVELS if by_gyro else UNGUIDED_LEVELS)
 
     def clear(self) -> None:
         """Follow nothing any more."""
@@ -73,13 +84,13 @@ class FeatureTracker:
         """As `PointHolder.renumber`."""
         self.ids = new[self.ids]
 
-    def judge(self, ids: I64, fits: Mask, patience: int) -> None:
-        """Note which points fitted the pose; give up those that failed `patience` times."""
+    def judge(self, ids: I64, fits: Mask) -> None:
+        """Note which points fitted the pose; give up those that failed too often."""
         where = np.isin(self.ids, ids)
         fitted = np.isin(self.ids, ids[fits])
         self.failures[where & ~fitted] += 1
         self.failures[fitted] = 0
-        self.keep(self.failures < patience)
+        self.keep(self.failures < PATIENCE)
 
     def thin(self, cell_px: float) -> None:
         """Keep one corner a cell of a grid, the one known longest: seen from higher up, corners

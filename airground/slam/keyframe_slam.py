@@ -25,6 +25,7 @@ from airground.slam.front_end import TrackedCorners
 from airground.slam.geometry.pose_estimation import PoseFit
 from airground.slam.image_turn import ImageTurn
 from airground.slam.inertial.stationarity import Rest
+from airground.slam.inertial_bridge import InertialBridge
 from airground.slam.keyframe_choice import KeyframeChoice
 from airground.slam.local_mapping import LocalMapper
 from airground.slam.loop_closure import LoopCloser
@@ -37,11 +38,6 @@ from airground.slam.sparse_map import SparseMap
 from airground.slam.spread_adjustment import WholeMap
 from airground.slam.starts import REST_WINDOW_NS, MovingStart
 from airground.slam.tracked_path import TrackedPath
-
-PATIENCE = 2
-"""A point that fits the pose badly in this many images in a row is given up."""
-GUIDED_LEVELS, UNGUIDED_LEVELS = 1, 3
-"""Pyramid levels above the image, with a gyro and without: prediction by a gyro is better."""
 
 
 class KeyframeSlam:
@@ -73,8 +69,7 @@ class KeyframeSlam:
         self.calibration, self.parameters = calibration, parameters
         self.camera, self.T_rig_camera = calibration.camera, calibration.T_imu_camera
         self.motion = MotionModel(calibration.imu, calibration.camera_time_offset_ns)
-        levels = GUIDED_LEVELS if calibration.imu is not None else UNGUIDED_LEVELS
-        self.tracker = FeatureTracker(parameters.patch_px, levels)
+        self.tracker = FeatureTracker.guided(parameters.patch_px, calibration.imu is not None)
         self._image_turn = ImageTurn(self.camera) if calibration.imu is None else None
         self.metric = self.inertial = False
         self._inverse_depth_sigma, self._max_depth_m = inverse_depth_sigma, max_depth_m
@@ -103,6 +98,7 @@ class KeyframeSlam:
         )
         self._whole = WholeMap(self.map, self.adjuster, self._loops)
         self._choice = KeyframeChoice(self.map, *own)
+        self._bridge = InertialBridge(self.map, self.motion, self.parameters, self._max_depth_m)
         self._culler = KeyframeCuller(self.map, self.adjuster, self._recovery, self.path, *own)
 
     @property
@@ -155,8 +151,10 @@ class KeyframeSlam:
             fit = self._recover(frame, prediction)
         self._move_on(frame, prediction, fit)
         self._adrift = fit is None and (self._adrift or cut or not prediction.inertial)
-        if self._in_doubt() or (fit is None and (self._adrift or self.published)):
+        if self._in_doubt():
             return None, False
+        if fit is None and (self._adrift or self.published):
+            return None, self._bridge_over(frame)
         timed = self.metric and self.calibration.imu is not None
         if self._choice.wanted(self.tracker, self.state, frame.stamp_ns, timed):
             before = self.T_map_camera()
@@ -222,10 +220,7 @@ class KeyframeSlam:
 
     def stranded(self) -> bool:
         """Whether neither images nor, from an image that was tied to the map, inertia lead here.
-
-        Inertia may carry a robot on as long as corners tie its images together, though none be
-        in the map yet; a view that it alone ties to the one before begins another map.
-        """
+        Inertia may carry a robot on as long as corners tie its images together."""
         followed = int(self.map.mapped(self.tracker.ids).sum())
         return self._adrift and followed < self.parameters.min_points
 
@@ -235,8 +230,8 @@ class KeyframeSlam:
 
     def depth_range(self) -> tuple[float, float] | None:
         """Nearest and farthest map point in the newest image [m]."""
-        least = self.parameters.min_points
-        return self.map.depth_range(self.tracker.ids, self.T_map_camera(), least)
+        seen = self.tracker.ids, self.T_map_camera()
+        return self.map.depth_range(*seen, self.parameters.min_points)
 
     def _predict(self, frame: Frame, turn: F64) -> Prediction:
         assert self.stamp_ns is not None
@@ -264,7 +259,7 @@ class KeyframeSlam:
         )
         if fit is None or (self.metric and jumps(fit.T_map_camera, expected)):
             return None
-        self.tracker.judge(ids, fit.inliers, PATIENCE)
+        self.tracker.judge(ids, fit.inliers)
         return fit
 
     def _recover(self, frame: Frame, prediction: Prediction) -> PoseFit | None:
@@ -287,6 +282,14 @@ class KeyframeSlam:
         self.state, self.stamp_ns, self._seen_ns = doubt.state, doubt.stamp_ns, doubt.seen_ns
         self._doubt = None
         self.tracker.restart(frame.image)
+
+    def _bridge_over(self, frame: Frame) -> bool:
+        """Map on from where inertia has led, if that is due; returns whether all was adjusted."""
+        known = self.published and self.inertial
+        if not (known and self._bridge.due(frame, self.state, self._seen_ns)):
+            return False
+        self.tracker.restart(frame.image)
+        return self._insert(frame)
 
     def _in_doubt(self) -> bool:
         """Whether the newest pose still waits to be confirmed."""

@@ -42,7 +42,7 @@ def test_only_failures_in_a_row_cost_a_corner_its_place() -> None:
 
     def judge(*fits: bool) -> None:
         rows = np.isin(judged, tracker.ids)
-        tracker.judge(judged[rows], np.array(fits)[rows], patience=2)
+        tracker.judge(judged[rows], np.array(fits)[rows])
 
     judge(True, False, False)
     assert tracker.failures.tolist() == [0, 1, 1, 0]
@@ -83,6 +83,6 @@ def test_after_clearing_nothing_is_followed_and_nothing_breaks() -> None:
     assert tracker.image is None
     tracker.advance(IMAGE, tracker.pixels)
     tracker.advance(IMAGE, tracker.pixels)
-    tracker.judge(np.empty(0, np.int64), np.empty(0, bool), 2)
+    tracker.judge(np.empty(0, np.int64), np.empty(0, bool))
     tracker.thin(13.0)
     assert len(tracker.ids) == len(tracker.pixels) == len(tracker.failures) == 0
