@@ -98,22 +98,25 @@ def _presets_figure(levels: Sequence[AtLevel]) -> ReportFigure:
 def _rivals_figure(
     levels: Sequence[AtLevel], rivals: dict[str, list[Achieved | None]]
 ) -> ReportFigure:
-    figure = Figure(figsize=(WIDE_IN, 0.6 + 0.26 * len(rivals)), layout="constrained")
+    figure = Figure(
+        figsize=(WIDE_IN, 0.8 + 0.07 * (1 + len(levels)) * len(rivals)), layout="constrained"
+    )
     axes = figure.subplots()
     colours = colormaps["viridis"](np.linspace(0.85, 0.0, len(levels)))  # harder is darker
     for row, found in enumerate(rivals.values()):
         places, shares, spans = _bars(found)
         for level, share, span in zip(places.astype(int), shares, spans.T, strict=True):
-            at = row + 0.12 * (level - (len(levels) - 1) / 2)
+            at = row + (level - (len(levels) - 1) / 2) / (1 + len(levels))
             axes.errorbar(
-                share, at, xerr=span[:, None], color=colours[level], marker="o", capsize=2
+                share, at, xerr=span[:, None], color=colours[level], marker="o", ms=3, capsize=1
             )
     for level, one in enumerate(levels):
         axes.errorbar([], [], color=colours[level], marker="o", label=str(one.level))
     axes.set_yticks(range(len(rivals)), list(rivals))
     axes.invert_yaxis()
     axes.set(xlim=(-3, 103), xlabel=f"best guess within {LOCATED_M:g} m after one aerial map [%]")
-    axes.legend()
+    axes.grid(axis="x")
+    figure.legend(loc="outside upper center", ncols=len(levels))
     caption = (
         "All methods after one aerial map at each level, with 95 % Wilson intervals. What each is "
         "given is in the table of baselines."
