@@ -157,7 +157,7 @@ def test_dials_turn_what_they_name() -> None:
     assert subject.sensors.every == 2
     faults = {(one.kind, one.robot): one.duration_s for one in subject.sensors.faults}
     both = {"dropped": 2.0, "imu_gap": 0.5, "black": 0.1, "frozen": 0.2, "exposure": 0.3}
-    both |= {"imu_saturated": 0.6, "imu_silent": 0.7}
+    both |= {"imu_saturated": 0.6, "imu_silent": 0.7, "repeated": 0.9}
     each = {(kind, robot): lasts for kind, lasts in both.items() for robot in ("mav", "ground")}
     assert faults == each | {("depth_gone", "ground"): 0.4, ("clock", "mav"): 0.0}
     (clock,) = [one for one in subject.sensors.faults if one.kind == "clock"]
