@@ -125,6 +125,7 @@ def test_dials_turn_what_they_name() -> None:
         "sensors.imu_gap_s": 0.5,
         "sensors.black_s": 0.1,
         "sensors.frozen_s": 0.2,
+        "sensors.repeated_s": 0.9,
         "sensors.overexposed_s": 0.3,
         "sensors.depth_gone_s": 0.4,
         "sensors.imu_saturated_s": 0.6,
