@@ -104,8 +104,7 @@ class Reproduce(
     quick: Annotated[bool, _SMALLER] = False
     """one small scene and a short flight: minutes instead of hours"""
     suite: Annotated[Literal["fast", "hard", "faults"] | None, _SMALLER, Shown("NAME")] = None
-    """a fixed small suite for check (docs/check_a_change.md), with the setup asked for only: fast,
-    hard or faults"""
+    """suite for check: fast, hard or faults (docs/check_a_change.md)"""
     level: Annotated[
         Literal["paper", "easy", "medium", "hard", "extreme"] | None, _SMALLER, Shown("NAME")
     ] = None

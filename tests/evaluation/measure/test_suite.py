@@ -70,6 +70,8 @@ def test_the_hard_suite_turns_what_the_level_turns() -> None:
     for flight in plan(0, "hard").flights:
         control = flight.scene.name in CONTROL_SCENES
         assert set(flight.dials or {}) == (set() if control else turned)
+        assert (flight.scene.ground.stop_at_overlap is None) == control
+        assert (flight.scene.flight_light is None) == control
 
 
 def test_each_flight_with_faults_has_one_of_its_own() -> None:

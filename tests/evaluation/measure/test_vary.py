@@ -125,6 +125,7 @@ def test_dials_turn_what_they_name() -> None:
         "sensors.imu_gap_s": 0.5,
         "sensors.black_s": 0.1,
         "sensors.frozen_s": 0.2,
+        "sensors.repeated_s": 0.9,
         "sensors.overexposed_s": 0.3,
         "sensors.depth_gone_s": 0.4,
         "sensors.imu_saturated_s": 0.6,
@@ -157,7 +158,7 @@ def test_dials_turn_what_they_name() -> None:
     assert subject.sensors.every == 2
     faults = {(one.kind, one.robot): one.duration_s for one in subject.sensors.faults}
     both = {"dropped": 2.0, "imu_gap": 0.5, "black": 0.1, "frozen": 0.2, "exposure": 0.3}
-    both |= {"imu_saturated": 0.6, "imu_silent": 0.7}
+    both |= {"imu_saturated": 0.6, "imu_silent": 0.7, "repeated": 0.9}
     each = {(kind, robot): lasts for kind, lasts in both.items() for robot in ("mav", "ground")}
     assert faults == each | {("depth_gone", "ground"): 0.4, ("clock", "mav"): 0.0}
     (clock,) = [one for one in subject.sensors.faults if one.kind == "clock"]
