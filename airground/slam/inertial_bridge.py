@@ -13,8 +13,8 @@ from airground.slam.motion_model import MotionModel
 from airground.slam.rig_state import RigState
 from airground.slam.sparse_map import SparseMap
 
-MAX_BRIDGE_NS = 4_000_000_000
-"""Longest time without a pose that inertia bridges [ns]: it drifts by 3 cm in 2 s."""
+MAX_BRIDGE_NS = 3_000_000_000
+"""Longest time without a pose that inertia bridges [ns]: it drifts by 3 cm in 2 s, by 7 in 3.4."""
 UNKNOWN_IMAGES = 4
 """So many images in a row must show what is not found in the map: blur can hide it in one."""
 MIN_CORNERS = 40
