@@ -212,6 +212,7 @@ class KeyframeSlam:
         """(6, 6) of the newest pose, within the map and of the map; to be asked once an image."""
         motion = fit.T_map_camera.translation, self.state.velocity
         shared = self._shared_errors.at(*motion, scale_sigma, tilt_sigma)
+        shared += self._bridge.covariance(self.tracker.ids, tilt_sigma)
         return fit.covariance + self._keyframe_covariance + shared
 
     def unseen_s(self) -> float:
@@ -219,8 +220,7 @@ class KeyframeSlam:
         return 0.0 if self.stamp_ns is None else (self.stamp_ns - self._seen_ns) * 1e-9
 
     def stranded(self) -> bool:
-        """Whether neither images nor, from an image that was tied to the map, inertia lead here.
-        Inertia may carry a robot on as long as corners tie its images together."""
+        """Whether neither images nor, from an image that was tied to the map, inertia lead here."""
         followed = int(self.map.mapped(self.tracker.ids).sum())
         return self._adrift and followed < self.parameters.min_points
 
