@@ -13,6 +13,7 @@ from airground.config import Config
 from airground.slam.frame import Frame
 from airground.slam.inertial_bridge import MAX_BRIDGE_NS, UNKNOWN_IMAGES, InertialBridge
 from airground.slam.rig_state import RigState
+from airground.slam.sparse_map import SparseMap
 
 STEP_NS = 33_333_333
 RNG = np.random.default_rng(0)
@@ -63,3 +64,48 @@ def test_inertia_bridges_no_gap_of_its_own_and_no_long_time() -> None:
     assert not any(asked(bridge(gap=True), frames))
     late = [frame(MAX_BRIDGE_NS // STEP_NS + k) for k in range(1, 3 * UNKNOWN_IMAGES)]
     assert not any(asked(bridge(), late))
+
+
+TILT = 0.005
+
+
+def posed(one: InertialBridge, shown: int, origin: int) -> NDArray[np.float64]:
+    """Covariance of a pose whose image shows points that a keyframe saw first."""
+    ids = one.map.new_points(np.zeros((shown, 2)), origin)
+    one.map.place(ids, np.zeros((shown, 3)))
+    return one.covariance(ids, TILT)
+
+
+def bridged() -> InertialBridge:
+    """One that went on at 1.1 s without a pose since 0 s: keyframes at 0 s and 1.1 s."""
+    one = bridge()
+    frames = [frame(30 + k) for k in range(UNKNOWN_IMAGES)]
+    assert asked(one, frames)[-1]
+    keyframes: Any = [SimpleNamespace(stamp_ns=0), SimpleNamespace(stamp_ns=frames[-1].stamp_ns)]
+    one.map = SparseMap()
+    one.map.keyframes = keyframes
+    return one
+
+
+def test_poses_behind_a_bridge_say_how_far_a_tilted_map_falls() -> None:
+    covariance = posed(bridged(), 50, origin=1)
+    seconds = (30 + UNKNOWN_IMAGES - 1) * STEP_NS * 1e-9
+    expected = np.diag([1, 1, 0, 0, 0, 0]) * (TILT * 0.5 * 9.81 * seconds**2) ** 2
+    np.testing.assert_allclose(covariance, expected, rtol=1e-3)
+
+
+def test_points_from_before_the_bridge_end_its_error() -> None:
+    one = bridged()
+    few = one.parameters.min_points - 1
+    assert posed(one, few, origin=0)[0, 0] > 0
+    assert not posed(one, few + 1, origin=0).any()
+    assert not posed(one, 50, origin=1).any(), "the end is for good"
+
+
+def test_bridges_add_up_and_one_that_is_tried_again_counts_once() -> None:
+    one, again = bridged(), bridge()
+    alone = posed(one, 50, origin=1)[0, 0]
+    asked(again, [frame(30 + k) for k in range(2 * UNKNOWN_IMAGES)])
+    assert again._bridged == {0: pytest.approx((30 + 2 * UNKNOWN_IMAGES - 1) * STEP_NS * 1e-9)}
+    one._bridged[40 * STEP_NS] = one._bridged[0]
+    assert posed(one, 50, origin=2)[0, 0] == pytest.approx(2 * alone)
