@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.height_map import lattice_index
-from airground.localization.cost_map import compute_cost_map, overlay_at
 from airground.localization.height_map_pair import HeightMapPair
 from airground.localization.particle_filter import motion_at
 from airground.pipeline import pair_of
@@ -15,24 +14,21 @@ from evaluation.setup.setups import with_localization
 
 MIN_OVERLAP = 0.5
 """Share of the aerial map's area that the maps must overlap by, as in the paper (Sec. VI-A)."""
-NO_HEADING = Answer(None, "the heading is unknown")
 
 
-def height_maps(given: Given, **localization: object) -> HeightMapPair | None:
-    """The maps that ours would make, turned by the magnetometers; None without heading."""
+def height_maps(given: Given, **localization: object) -> HeightMapPair:
+    """The maps that ours would make, with the paper's least overlap. The heading is searched where
+    ours does, and where the magnetometers give none."""
+    settings = {"min_overlap": MIN_OVERLAP, **localization}
     if given.sighting.heading is None:
-        return None
-    return pair_of(
-        given.sighting,
-        with_localization(given.config, heading="known", min_overlap=MIN_OVERLAP, **localization),
-    )
+        settings["heading"] = "search"
+    return pair_of(given.sighting, with_localization(given.config, **settings))
 
 
-def answer_at(given: Given, maps: HeightMapPair, position: NDArray) -> Answer:
-    """The answer that puts the MAV's camera at (x, y) in `ground` [m].
+def answer_at(given: Given, maps: HeightMapPair, estimate: NDArray) -> Answer:
+    """The answer that puts the MAV's camera at (x, y) in `ground` [m] with a heading [rad].
     The height follows from the mean difference over the overlap (Delta z of Sec. VI-A)."""
-    offset = float(overlay_at(maps.aerial, maps.ground, position[None]).height_offsets()[0])
-    estimate = np.array([*position, maps.turn])
+    offset = float(maps.overlay(estimate[None]).height_offsets()[0])
     camera_mav = given.sighting.surface.T_mav_camera.translation
     return Answer(motion_at(estimate, camera_mav, offset))
 
@@ -41,13 +37,11 @@ def lowest_cost(given: Given, cost: str, min_relief_m: float) -> Answer:
     """The position of lowest cost ("zmssd" or "ncc") in the search region (Eq. 3), always claimed.
     `min_relief_m` is the least standard deviation of both maps' heights in the correlation."""
     maps = height_maps(given, cost=cost, min_relief_m=min_relief_m)
-    if maps is None:
-        return NO_HEADING
-    robot, config = maps.ground_robot_position, maps.config.localization
-    best = compute_cost_map(maps.aerial, maps.ground, robot, maps.turn, config).best()
+    cost_map = maps.volume.cost_map(cost)
+    best = cost_map.best()
     if best is None:
         return Answer(None, f"nowhere do the maps overlap by {MIN_OVERLAP:.0%}")
-    return answer_at(given, maps, best)
+    return answer_at(given, maps, np.array([*best, cost_map.heading]))
 
 
 RELIEF_FLOOR_M = 0.001
@@ -67,13 +61,14 @@ def zmssd_search(given: Given) -> Answer:
 
 def phase_correlation(given: Given) -> Answer:
     """Register the height maps as images with holes, by scikit-image.
-    Its overlap rule is a share of the largest overlap of any offset. An offset outside of the
-    search region is not claimed; any other is."""
+    It compares translations alone, so the heading is always that of the magnetometers. Its overlap
+    rule is a share of the largest overlap of any offset. An offset outside of the search region is
+    not claimed; any other is."""
     from skimage.registration import phase_cross_correlation
 
-    maps = height_maps(given)
-    if maps is None:
-        return NO_HEADING
+    if given.sighting.heading is None:
+        return Answer(None, "the heading is unknown")
+    maps = height_maps(given, heading="known")
     ground, ground_mask = _image(maps.ground.heights)
     aerial, aerial_mask = _image(_padded(maps.aerial.heights, ground.shape))
     if not (ground_mask.any() and aerial_mask.any()):
@@ -88,7 +83,7 @@ def phase_correlation(given: Given) -> Answer:
     # The shift is between arrays; their places on the lattice make it one of the camera.
     offset = np.rint(shift) + lattice_index(maps.ground) - lattice_index(maps.aerial)
     position = offset / maps.ground.cells_per_m
-    found = answer_at(given, maps, position)
+    found = answer_at(given, maps, np.array([*position, maps.turn]))
     radius_m = given.config.localization.search_radius_m
     if (np.abs(position - maps.ground_robot_position) > radius_m).any():
         return Answer(found.T_ground_mav, "the best offset lies outside of the search region")

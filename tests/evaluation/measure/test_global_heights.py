@@ -1,4 +1,4 @@
-"""Scan context and clustered particles on height maps, in worlds where the answer is known."""
+"""Searches of height maps at any heading, in worlds where the answer is known."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from airground.pipeline import pair_of
 from evaluation.measure.baselines import gradient_particles as gradients
 from evaluation.measure.baselines import scan_context as context
 from evaluation.measure.baselines.gradient_particles import Slopes, clustered, gradient_particles
+from evaluation.measure.baselines.height_search import ncc_search, zmssd_search
 from evaluation.measure.baselines.interface import Given
 from evaluation.measure.baselines.scan_context import (
     RINGS,
@@ -47,15 +48,19 @@ def turned(given: Given, turn: float) -> Given:
     return replace(given, sighting=replace(given.sighting, surface=moved, heading=None))
 
 
-@BOTH
+@pytest.mark.parametrize(
+    ("locate", "most_deg"),
+    # Cells of 5 cm tell small turns of a map of 2 m apart by their few pixels at the edges alone.
+    [(scan_context, 1.1), (gradient_particles, 1.1), (zmssd_search, 3.0), (ncc_search, 3.0)],
+)
 @pytest.mark.parametrize("turn", [0.0, 1.9, -2.8])
-def test_the_place_is_found_at_any_heading(locate, turn: float) -> None:  # type: ignore[no-untyped-def]
+def test_the_place_is_found_at_any_heading(locate, most_deg: float, turn: float) -> None:  # type: ignore[no-untyped-def]
     given = given_of(boxes_on_floor())
     answer = locate(turned(given, turn))
     assert answer.claimed, answer.refusal
     off_m, off_deg = error_of(answer.T_ground_mav @ SE3.from_heading(turn), given)
     assert off_m < 0.06
-    assert off_deg < 1.1
+    assert off_deg < most_deg
 
 
 @BOTH
