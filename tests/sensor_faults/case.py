@@ -22,11 +22,13 @@ from airground.slam.front_end import TrackedPose, Tracking
 from airground.slam.front_ends import GROUND, MAV, Ingredients, make_front_end
 from sim.recording.recorder import Flight, rendered
 from sim.recording.truth import Truth
-from sim.sensors.faults import Fault, faulty_imu
+from sim.sensors.faults import Fault, clock_of, faulty_imu
 from sim.sensors.faulty_frames import FaultyFrames
+from sim.sensors.robot_clock import RobotClock
 
 AFTER_S = 5.0
 """Time after the last fault in which the robot can find itself again [s]."""
+STEADY = RobotClock()
 SILENT_M, SILENT_SIGMAS = 0.05, 3.0
 """A pose whose error grew by more than both, by its own covariance, is silently wrong."""
 
@@ -118,9 +120,11 @@ def outcome(
     faults: Sequence[Fault],
     dark: Collection[int],
     after_s: float = AFTER_S,
+    clock: RobotClock = STEADY,
 ) -> Outcome:
     """Track a robot through its faults, and for `after_s` on, and hold its poses against the truth;
-    `dark` are stamps of images that show nothing new (`unseen`) [ns]."""
+    `dark` are stamps of images that show nothing new (`unseen`) [ns], and `clock` is that of the
+    stamps, where the truth does not know of its steps."""
     ahead_ns = sum(round(fault.strength * 1e9) for fault in faults if fault.kind == "clock")
     start_ns = min(fault.start_ns for fault in faults)
     end_ns = max(fault.end_ns for fault in faults)
@@ -130,14 +134,14 @@ def outcome(
         place = traceback.extract_tb(error.__traceback__)[-1]
         said = f"{type(error).__name__} at {Path(place.filename).name}:{place.lineno}"
         return Outcome(0, 0, *6 * [np.nan], 0, said)
-    return judged(poses, truth, faults[0].robot, start_ns, end_ns, ahead_ns, dark)
+    return judged(poses, truth, faults[0].robot, start_ns, end_ns, ahead_ns, dark, clock)
 
 
 def outcome_in(recording: Recording, faults: Sequence[Fault], after_s: float = AFTER_S) -> Outcome:
     """The outcome of faults of one robot in a recording that was made without faults."""
     camera_stamps = recording.of(Source[faults[0].robot.upper()]).camera_stamps
     part, truth = stored(recording, faults), Truth.open(recording.path)
-    return outcome(part, truth, faults, unseen(camera_stamps, faults), after_s)
+    return outcome(part, truth, faults, unseen(camera_stamps, faults), after_s, clock_of(faults))
 
 
 def judged(
@@ -148,6 +152,7 @@ def judged(
     end_ns: int,
     ahead_ns: int,
     dark: Collection[int] = (),
+    clock: RobotClock = STEADY,
 ) -> Outcome:
     """Hold poses against the truth, from the start to the end of the faults and on.
 
@@ -157,7 +162,7 @@ def judged(
         return pose.stamp_ns - (ahead_ns if pose.stamp_ns >= start_ns + ahead_ns else 0)
 
     def true(pose: TrackedPose) -> SE3:
-        return truth.T_world_camera(robot, pose.stamp_ns)
+        return truth.T_world_camera(robot, clock.time_ns(pose.stamp_ns))
 
     known = [pose for pose in poses if pose.tracking is Tracking.TRACKED]
     before = [pose for pose in known if taken(pose) < start_ns]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from sim.robots.motion import Robot
 from sim.scene import load_scene
 from sim.sensors.faults import Fault, FaultKind
 from sim.sensors.presets import NOMINAL
+from sim.sensors.robot_clock import RobotClock
 from tests.sensor_faults.__main__ import SCENE, SEED
 from tests.sensor_faults.case import Outcome, drawn, judged, outcome, outcome_in, unseen
 
@@ -89,6 +91,18 @@ def test_a_wrong_heading_and_poses_of_black_images_are_counted() -> None:
     assert found.off_deg == pytest.approx(np.degrees(0.1))
     assert found.off_m < 1e-9
     assert found.blind == 3
+
+
+def test_poses_by_a_clock_that_stepped_are_held_against_the_truth_of_their_time() -> None:
+    ahead_ns, start_ns = 15 * STEP_NS, START * STEP_NS
+    clock = RobotClock.stepping([(start_ns, ahead_ns)])
+    made = [
+        replace(pose, stamp_ns=int(clock.stamps_ns(np.array([pose.stamp_ns]))[0]))
+        for pose in poses([0.0] * 30)
+    ]
+    times: Any = "mav", start_ns, start_ns, ahead_ns, ()
+    assert judged(made, Straight(), *times, clock).off_m < 1e-9  # type: ignore[arg-type]
+    assert judged(made, Straight(), *times).off_m == pytest.approx(0.15)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
