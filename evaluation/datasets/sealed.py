@@ -18,7 +18,7 @@ import numpy as np
 from airground.errors import InputError
 from airground.io.header import read_header, write_toml
 from airground.io.layout import HEADER, TRUTH
-from evaluation.judge.score.benchmark import BENCHMARK, Benchmark
+from evaluation.judge.score.benchmark import BENCHMARK, Benchmark, read_benchmark
 from evaluation.measure.levels.level import Level
 from evaluation.setup.checked_json import read_checked
 from evaluation.setup.output import check_free, continued_folder
@@ -111,14 +111,22 @@ def make_benchmark(
             impossible over every heap that was tried.
     """
     folders = [out] if truth is None else [out, truth]
+    data, home = (f.with_name(f".{f.name}.partial") for f in (folders[0], folders[-1]))
+    if truth is not None and data.is_dir() and not home.exists() and _states(truth, draw):
+        # A killed process had renamed this folder and not yet the other.
+        folders, home = [out], truth
     for folder in folders:
         check_free(folder)
-    data, home = (f.with_name(f".{f.name}.partial") for f in (folders[0], folders[-1]))
     with continued_folder(data), nullcontext() if home == data else continued_folder(home):
         _record_missing(draw, data, home, workers, make or _recorded)
-        if truth is not None:
+        if truth is not None and home != truth:
             home.rename(truth)
         data.rename(out)
+
+
+def _states(truth: Path, draw: Draw) -> bool:
+    """Whether a folder of truth is of that draw."""
+    return truth.is_dir() and read_benchmark(truth) == draw.benchmark()
 
 
 def _record_missing(

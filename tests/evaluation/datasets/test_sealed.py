@@ -173,6 +173,27 @@ def test_a_benchmark_goes_on_where_it_stopped(small: Path, tmp_path: Path) -> No
     assert not [name for name in files(data) if "truth" in name or BENCHMARK in name]
 
 
+def test_a_benchmark_killed_between_its_two_folders_goes_on(small: Path, tmp_path: Path) -> None:
+    draw, other = (Draw(load_level("hard"), 1, seed) for seed in (5, 6))
+    data, truth = tmp_path / "data", tmp_path / "truth"
+
+    def make(flight: Flight, out: Path, workers: int) -> Path:
+        return Path(shutil.copytree(small, out))
+
+    def never(flight: Flight, out: Path, workers: int) -> Path:
+        raise AssertionError("everything is recorded")
+
+    make_benchmark(draw, data, truth, 1, make)
+    expected = files(data), files(truth)
+    data.rename(tmp_path / ".data.partial")
+    with pytest.raises(InputError, match="truth: exists already"):
+        make_benchmark(other, data, truth, 1, never)
+    make_benchmark(draw, data, truth, 1, never)
+    assert (files(data), files(truth)) == expected
+    with pytest.raises(InputError, match="exists already"):
+        make_benchmark(draw, data, truth, 1, never)
+
+
 def test_without_sealing_the_truth_stays(small: Path, tmp_path: Path) -> None:
     draw = Draw(load_level("easy"), 1, 0)
     make_benchmark(
