@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 import zlib
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -14,7 +15,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from airground.errors import RecordingError
-from airground.io.images import read_colour, read_grey
+from airground.io.images import read_colour, read_grey, read_units
 from airground.io.png import SIGNATURE, decode_png, undo_filters
 
 FILTERS = (
@@ -205,18 +206,30 @@ def test_what_is_wrong_with_another_kind_is_not_written_to_the_screen(
     assert capfd.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize("colour", [False, True])
-def test_interlaced_images(tmp_path: Path, colour: bool) -> None:
-    """Adam7 by hand: each pass is a small image."""
-    shape = (9, 11, 3) if colour else (9, 11)
-    image = np.random.default_rng(0).integers(0, 256, shape, np.uint8)
+def adam7(image: NDArray[Any], bits: int, colour_type: int) -> bytes:
+    """An interlaced PNG file by hand: each pass is a small image."""
     starts = [(0, 0, 8, 8), (0, 4, 8, 8), (4, 0, 8, 4), (0, 2, 4, 4), (2, 0, 4, 2)]
     starts += [(0, 1, 2, 2), (1, 0, 2, 1)]
     passes = [image[y::dy, x::dx] for y, x, dy, dx in starts]
     raw = b"".join(b"\0" + row.tobytes() for one in passes if one.size for row in one)
-    size = struct.pack(">IIBBBBB", 11, 9, 8, 2 if colour else 0, 0, 0, 1)
+    height, width = image.shape[:2]
+    size = struct.pack(">IIBBBBB", width, height, bits, colour_type, 0, 0, 1)
     chunks = (b"IHDR", size), (b"IDAT", zlib.compress(raw)), (b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + b"".join(map(chunk, chunks))
+
+
+@pytest.mark.parametrize("colour", [False, True])
+def test_interlaced_images(tmp_path: Path, colour: bool) -> None:
+    shape = (9, 11, 3) if colour else (9, 11)
+    image = np.random.default_rng(0).integers(0, 256, shape, np.uint8)
     file = tmp_path / "a.png"
-    file.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(map(chunk, chunks)))
+    file.write_bytes(adam7(image, 8, 2 if colour else 0))
     read = read_colour if colour else read_grey
     np.testing.assert_array_equal(read(file, 11, 9), image)
+
+
+def test_interlaced_depth(tmp_path: Path) -> None:
+    depth_mm = np.random.default_rng(0).integers(0, 65536, (9, 11), np.uint16)
+    file = tmp_path / "a.png"
+    file.write_bytes(adam7(depth_mm.astype(">u2"), 16, 0))
+    np.testing.assert_array_equal(read_units(file, 11, 9), depth_mm)
