@@ -92,8 +92,11 @@ class RobotProcess(AbstractContextManager["RobotProcess"]):
         self.receive()
 
     def start(self, order: object = None) -> None:
-        """Send the start order."""
-        self._pipe.send(order)
+        """Send the start order; raises AirgroundError if the process died."""
+        try:
+            self._pipe.send(order)
+        except OSError:
+            raise self._died() from None
 
     def receive(self, or_none: bool = False) -> Any:
         """The next answer; None with `or_none` if the process died. Raises AirgroundError if the
@@ -103,9 +106,7 @@ class RobotProcess(AbstractContextManager["RobotProcess"]):
         except (EOFError, OSError):
             if or_none:
                 return None
-            raise AirgroundError(
-                f"{self._name}: its process died, perhaps for lack of memory"
-            ) from None
+            raise self._died() from None
         if isinstance(answer, AirgroundError):
             raise answer
         return answer
@@ -113,6 +114,9 @@ class RobotProcess(AbstractContextManager["RobotProcess"]):
     def answers_within(self, seconds: float) -> bool:
         """Whether an answer, or the end of the process, comes within this time [s]."""
         return self._pipe.poll(seconds)
+
+    def _died(self) -> AirgroundError:
+        return AirgroundError(f"{self._name}: its process died, perhaps for lack of memory")
 
     def __exit__(self, *_: object) -> None:
         self._process.kill()

@@ -18,9 +18,10 @@ from pathlib import Path
 
 import numpy as np
 
+from evaluation.setup.console import EXIT_INTERNAL
 from tests.kills.commands import RESUMING, VERBS, commands, make_inputs
 from tests.kills.roles import Role
-from tests.kills.same import differences
+from tests.kills.same import differences, lacks_a_robot
 from tests.kills.victim import Command, Left
 
 SIGNALS = ("KILL", "TERM", "INT")
@@ -95,9 +96,13 @@ class Campaign:
                 # did not.
                 whole_s = min(whole_s, time.monotonic() - began_s)
             self.note(number, hit, left)
+            if code == EXIT_INTERNAL:
+                self.faults.append(f"{number.name}: an internal error")
             resumes = self.verb in RESUMING and victim.whole() and code != 0
             if not resumes:
-                if victim.whole():
+                if victim.whole() and lacks_a_robot(victim.output()):
+                    self.left["without_a_robot"] += 1
+                elif victim.whole():
                     # Killed after its last step, or its worker replaced, it has written all.
                     wrong = self.compare(good, victim, f"{k}")
                     said = f"{number.name}, exit code {code}: the output looks whole, but"

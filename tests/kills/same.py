@@ -40,6 +40,13 @@ def differences(verb: str, expected: Path, found: Path) -> list[str]:
     return wrong
 
 
+def lacks_a_robot(output: Path) -> bool:
+    """Whether it is of a live run that goes on without a robot whose process died, and says so."""
+    summary = output / "summary.json"
+    live = json.loads(summary.read_text("utf-8")).get("realtime") if summary.exists() else None
+    return live is not None and any(live[name]["survived"] == 0 for name in ("mav", "ground"))
+
+
 def compared(verb: str, output: Path) -> tuple[list[str], list[str]]:
     """Files that are compared, and those that are not."""
     every = sorted(names(output))

@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from tests.kills.same import compared, differences
+from tests.kills.same import compared, differences, lacks_a_robot
 
 ROWS = [("timing", 14.0), ("run", 30.0), ("realtime", 5.0), ("localization", 0.25)]
 
@@ -61,3 +61,12 @@ def test_a_file_in_one_only_is_a_difference(name: str, tmp_path: Path) -> None:
     if name == ".hidden":
         (other / name).touch()
     assert differences("live", one, other) == [f"{name} is in one only"]
+
+
+def test_a_live_run_without_a_robot_says_so(tmp_path: Path) -> None:
+    summary = tmp_path / "summary.json"
+    assert not lacks_a_robot(tmp_path)
+    for live, expected in ((None, False), ((1, 1), False), ((0, 1), True)):
+        robots = live and {"mav": {"survived": live[0]}, "ground": {"survived": live[1]}}
+        summary.write_text(json.dumps({"realtime": robots}))
+        assert lacks_a_robot(tmp_path) == expected

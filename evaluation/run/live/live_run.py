@@ -177,6 +177,7 @@ class LiveTracking(AbstractContextManager["LiveTracking"]):
         self.log = log = LiveLog(clock)
         for process in self._processes.values():
             process.start(clock)
+        logger.debug("both robots play")
         patience_s = playback.patience_s
         if playback.radio is not None:
             patience_s += playback.radio.latency_ms * 1e-3
@@ -207,6 +208,11 @@ class LiveTracking(AbstractContextManager["LiveTracking"]):
             log.reports[robot] = report
             log.late_ns[robot] = self._streams[robot].late_ns
             name, malformed = robot.name.lower(), self._streams[robot].malformed
+            if report is None:
+                logger.warning(
+                    "%s: its process died or fell silent; what is left is without its trajectory",
+                    name,
+                )
             if malformed:
                 logger.warning("%s: dropped messages that were malformed: %d", name, malformed)
             answers, final = (report.log, report.final) if report else (FrontEndLog(), None)

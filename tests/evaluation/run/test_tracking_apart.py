@@ -140,3 +140,14 @@ def test_a_death_raises_an_error_and_all_processes_end_with_the_block(
             list(frames)
     assert len(pids) == 2
     assert not any(Path(f"/proc/{pid}").exists() for pid in pids)
+
+
+@pytest.mark.slow
+@pytest.mark.subject(but={"airground/slam": "the process dies whatever it would track"})
+def test_a_death_before_the_start_is_the_same_error(small: Path) -> None:
+    with TrackingApart(task(small)) as apart:
+        apart.wait_until_ready()
+        os.kill(apart.pids[1], signal.SIGKILL)
+        os.waitid(os.P_PID, apart.pids[1], os.WEXITED | os.WNOWAIT)
+        with pytest.raises(AirgroundError, match="airground-mav: its process died"):
+            list(apart.frames())
