@@ -133,17 +133,24 @@ class Crew:
     def _local(self) -> LocalCluster:
         # Whoever reaches a port of Dask runs code as this user, and other users of the machine
         # reach the loopback interface: only holders of this run's own key may connect.
-        cluster = LocalCluster(
-            n_workers=self._workers,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            protocol="tls",
-            security=Security.temporary(),
-            scheduler_kwargs=NO_DASHBOARD,
-            memory_limit=0,
-            silence_logs=logging.CRITICAL,
-        )
+        try:
+            cluster = LocalCluster(
+                n_workers=self._workers,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                protocol="tls",
+                security=Security.temporary(),
+                scheduler_kwargs=NO_DASHBOARD,
+                memory_limit=0,
+                silence_logs=logging.CRITICAL,
+            )
+        except RuntimeError as error:  # of Dask, where a worker dies before it is ready
+            logger.debug("Dask: %s", error)
+            raise AirgroundError(
+                "the worker processes did not start, perhaps for lack of memory; "
+                "give fewer --threads"
+            ) from None
         return self._stack.enter_context(cluster)
 
 

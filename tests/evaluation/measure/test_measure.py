@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 
+import dask
 import pytest
 
 from airground.errors import AirgroundError, InputError
@@ -20,6 +21,10 @@ from evaluation.measure.work.out_folder import LOCK, resumable_folder
 from evaluation.measure.work.unit import Finished, Unit, UnitStore
 from evaluation.table.rows import ResultTable
 from tests.evaluation.measure.fake import DIE, DIE_ONCE, REFUSE, fake_units, runs, work
+
+
+DYING = "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
+"""What a worker that is killed as it starts runs first."""
 
 
 @pytest.fixture(autouse=True)
@@ -96,6 +101,19 @@ def test_a_task_that_kills_every_worker_is_an_error(tmp_path: Path) -> None:
         measured(units, tmp_path / "out")
     assert runs(tmp_path / "flights") == [4]
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.subject("evaluation/measure/work/crew.py", "airground/errors.py")
+def test_workers_that_die_as_they_start_are_an_error(
+    tmp_path: Path,
+) -> None:
+    with (
+        dask.config.set({"distributed.worker.preload": [DYING]}),
+        Crew(None, 1, 1, tmp_path) as crew,
+        pytest.raises(AirgroundError, match="the worker processes did not start"),
+    ):
+        list(crew.outcomes(str, [1]))
 
 
 def test_a_refused_unit_ends_the_run_and_finished_units_stay(
