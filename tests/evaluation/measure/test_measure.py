@@ -22,7 +22,6 @@ from evaluation.measure.work.unit import Finished, Unit, UnitStore
 from evaluation.table.rows import ResultTable
 from tests.evaluation.measure.fake import DIE, DIE_ONCE, REFUSE, fake_units, runs, work
 
-
 DYING = "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
 """What a worker that is killed as it starts runs first."""
 
