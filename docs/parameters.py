@@ -5,6 +5,7 @@ from typing import Literal, get_args, get_origin
 
 from airground.config import Section, paper
 from evaluation.setup.settings import Settings
+from evaluation.setup.switches import SWITCH_OF, condition_of
 
 PAGE = Path(__file__).with_suffix(".md")
 INTRODUCTION = """\
@@ -21,7 +22,8 @@ airground run RECORDING --config results/a/config.toml --out DIR
 ```
 
 `--config` takes a file in the form of the `config.toml` that every run leaves: `preset`, and one
-table for each section below. What it leaves out stays as the preset has it. `--set` comes last.
+table for each section below. What it leaves out stays as the preset has it. `--set` comes last. `--set` of a parameter that
+another one switches off ("only with") is refused; a file may have it.
 """
 
 
@@ -44,6 +46,8 @@ def _section(name: str, best: Section, published: Section) -> str:
         meaning = " ".join((field.description or "").split()).replace("|", "\\|")
         if get_origin(field.annotation) is Literal:
             meaning += f" One of {', '.join(f'`{one}`' for one in get_args(field.annotation))}."
+        if f"{name}.{key}" in SWITCH_OF:
+            meaning += f" Only with `{condition_of(f'{name}.{key}')}`."
         shown = "-" if theirs == ours else _value(theirs)
         lines.append(f"| `{key}` | {_value(ours)} | {shown} | {meaning} |")
     return "\n".join([*lines, ""])

@@ -191,8 +191,18 @@ class ConfigOptions:
         from evaluation.setup.settings import resolve_all
 
         return resolve_all(
-            self.preset, self.config, self.overrides, heading, self.sections, self.idle
+            self.preset,
+            self.config,
+            self.overrides,
+            heading,
+            self.sections,
+            self.idle,
+            self.varied(),
         )
+
+    def varied(self) -> tuple[str, ...]:
+        """Parameters to which other options give several values."""
+        return ()
 
     def idle(self, section: str, key: str) -> str:
         """Why a parameter would change nothing beside the other options; empty if it may."""
@@ -218,6 +228,9 @@ class PipelineOptions(ConfigOptions):
     ] = None
     """from the magnetometers, or searched as a third dimension"""
 
+    def settings(self, heading: str | None = None) -> Settings:
+        return super().settings(heading or self.north)
+
     def idle(self, section: str, key: str) -> str:
         if section in sections.SLAM.values() and self.poses == "oracle":
             return "--poses oracle puts true poses in place of SLAM"
@@ -233,7 +246,7 @@ class PipelineOptions(ConfigOptions):
         """
         from evaluation.setup.setups import EXACT, Reference, Setup
 
-        settings = self.settings(self.north)
+        settings = self.settings()
         noise = settings.oracle.noise()
         if self.poses == "slam" and noise != EXACT:
             raise InputError(ERRORS_OF_SLAM)

@@ -136,7 +136,7 @@ class Reproduce(
         from evaluation.show.report.page import write_results
         from evaluation.show.report.screen import print_summary
 
-        plan = self.plan() if self.suite is None else self._suite(self.suite)
+        plan = self.plan() if self.suite is None else self.suite_plan(self.suite)
         setup, seed, level = plan.setups[0], self.checked_seed(), self._level()
         with (
             resumable_folder(self.out) as folder,
@@ -154,7 +154,8 @@ class Reproduce(
                 summary = write_results(results, folder.results)
         print_summary(summary)
 
-    def _suite(self, name: SuiteName) -> Plan:
+    def suite_plan(self, name: SuiteName) -> Plan:
+        """What the suite of this name measures, checked."""
         from evaluation.measure.suite import SUITES
         from evaluation.setup.settings import ProtocolCounts
         from sim.sensors.presets import sensor_preset
@@ -165,15 +166,15 @@ class Reproduce(
                 raise InputError(f"--{field}: the suite {name} is fixed; give it without --suite")
         if self.alone:
             raise InputError(f"--alone: the suite {name} has one setup anyway; leave it out")
-        if self.settings().protocol != ProtocolCounts():
-            raise InputError(f"section protocol: the suite {name} is fixed")
         if suite.sensors is not None and self.sensors:
             raise InputError(f"--sensors: the suite {name} fixes it; give it without --suite")
         if suite.heading is not None:
             self._refuse_heading(f"the suite {name}", "--suite")
-        setup = (self if suite.heading is None else replace(self, north=suite.heading)).setup()
+        asked = self if suite.heading is None else replace(self, north=suite.heading)
+        if asked.settings().protocol != ProtocolCounts():
+            raise InputError(f"section protocol: the suite {name} is fixed")
         sensors = sensor_preset(suite.sensors or self.sensors or FULL.sensors)
-        return suite.plan(setup, sensors, self.checked_seed())
+        return suite.plan(asked.setup(), sensors, self.checked_seed())
 
     def plan(self) -> Plan:
         """What the words ask for, checked."""
@@ -181,7 +182,8 @@ class Reproduce(
         from evaluation.setup.setups import with_companions
 
         level = self._level()
-        setup = (self if level is None else replace(self, north=level.heading)).setup()
+        asked = self if level is None else replace(self, north=level.heading)
+        setup = asked.setup()
         if self.budget and setup.poses != "slam":
             raise InputError("--budget asks what SLAM loses among others; give --poses slam")
         extent = self._extent(setup.config.preset, level)
@@ -189,7 +191,7 @@ class Reproduce(
         return Plan(
             flights=self._flights(extent, level),
             setups=setups if level is None else level.under(setups),
-            protocol=self._protocol(extent),
+            protocol=asked._protocol(extent),
             budget=self.budget,
             negatives=extent.negatives,
             sequences=int(in_range("--sequences", self.sequences or 0)),

@@ -24,6 +24,7 @@ from evaluation.commands.options import (
 from evaluation.commands.sections import USED
 
 if TYPE_CHECKING:
+    from airground.config import Config
     from evaluation.measure.plans.sweep import SweepPlan
 
 
@@ -85,13 +86,14 @@ class Sweep(SensorOption, SeedOption, PipelineOptions, ResumableOutOption, Clust
         if self.duration_s is not None:
             in_range("--duration-s", self.duration_s, low=1, high=600)
         varied = parse_vary(self.vary)
+        setup = self.setup()
         for vary in varied:
-            self._check_alone(vary.name)
+            self._check_alone(vary.name, setup.config)
         plan = SweepPlan(
             varied=varied,
             scenes=tuple(load_scene(scene) for scene in self.scenes),
             flights=int(in_range("--flights", self.flights, low=1)),
-            setup=self.setup(),
+            setup=setup,
             sensors=sensor_preset(self.sensors_name()),
             protocol=Protocol(asked.sequences_per_flight or SEQUENCES, asked.trials or TRIALS),
             seed=self.checked_seed(),
@@ -101,10 +103,15 @@ class Sweep(SensorOption, SeedOption, PipelineOptions, ResumableOutOption, Clust
             plan.units(point)
         return plan
 
-    def _check_alone(self, name: str) -> None:
+    def varied(self) -> tuple[str, ...]:
+        return tuple(word.partition("=")[0].strip() for word in self.vary)
+
+    def _check_alone(self, name: str, config: Config) -> None:
         """InputError if what is varied changes nothing, or has a value by another option, too."""
+        from evaluation.setup.switches import switched_off
+
         section, _, key = name.partition(".")
-        if reason := self.idle(section, key):
+        if reason := self.idle(section, key) or switched_off(config, name, self.varied()):
             raise InputError(f"--vary {name}: {reason}")
         by_heading = name == "localization.heading" and self.north is not None
         if by_heading or self.sets(name):

@@ -13,6 +13,7 @@ from airground.config import PRESETS, Config, Section
 from airground.errors import ConfigError
 from airground.io.input_files import parse_toml, read_toml_text
 from evaluation.setup.setups import PoseNoise, Reference
+from evaluation.setup.switches import switched_off
 
 DEFAULT_PRESET = "best"
 
@@ -120,6 +121,7 @@ def resolve_all(
     heading: str | None = None,
     sections: Sequence[str] = (),
     idle: Callable[[str, str], str] = lambda section, key: "",
+    varied: Collection[str] = (),
 ) -> Settings:
     """All parameters that the command line asks for.
 
@@ -131,6 +133,7 @@ def resolve_all(
         sections: Sections of `EVALUATOR_SECTIONS` that have a meaning here, among others.
         idle: Why a parameter (section, name) of `overrides` would change nothing; empty if it may.
             A file may have parameters that change nothing, so that one serves all verbs.
+        varied: Parameters "section.name" to which a sweep gives several values.
 
     Raises:
         ConfigError: A name is unknown, a value is out of its range, or the file is no TOML; or
@@ -154,7 +157,7 @@ def resolve_all(
             settings = with_value(settings, section, key, value, str(file), unused)
     if heading is not None:
         settings = with_value(settings, "localization", "heading", heading, "--heading")
-    seen = set()
+    seen: dict[str, str] = {}
     for override in overrides:
         section, key, value = _split(override)
         name, origin = f"{section}.{key}", f"--set {override}"
@@ -164,8 +167,11 @@ def resolve_all(
             raise ConfigError(f"{origin}: --heading {heading} sets it as well; give one of the two")
         if name in seen:
             raise ConfigError(f"{origin}: {name} is given twice")
-        seen.add(name)
+        seen[name] = origin
         settings = with_value(settings, section, key, value, origin, unused)
+    for name, origin in seen.items():
+        if reason := switched_off(settings, name, varied):
+            raise ConfigError(f"{origin}: {reason}")
     return settings
 
 

@@ -10,11 +10,20 @@ from airground.config import Config
 from airground.errors import InputError
 from evaluation import cli
 from evaluation.commands.options import ConfigOptions
+from evaluation.commands.reproduce import Reproduce
 from evaluation.commands.sections import PIPELINE, USED
 from evaluation.commands.sweep import Sweep
 from evaluation.commands.verbs import VERBS, verb_class
 from evaluation.setup import console
-from evaluation.setup.settings import EVALUATOR_SECTIONS, Settings, write_config
+from evaluation.setup.settings import EVALUATOR_SECTIONS, Settings, with_value, write_config
+from evaluation.setup.switches import SWITCH_OF, switched_off
+
+OTHER_WORDS = {
+    "localization.heading": "known",
+    "localization.cost": "ncc",
+    "localization.estimate": "mean",
+    "plane_sweep.smoothing": "none",
+}
 
 USELESS = {
     "bench --recording R --sensors real": "--sensors real: of the recording that bench makes",
@@ -53,6 +62,20 @@ USELESS = {
     "reproduce --set rerun.level=all": "reproduce does not use section rerun",
     "reproduce --level hard --set localization.heading=search": "level hard fixes it",
     "reproduce --level hard --set localization.heading=known": "level hard fixes it",
+    "run R --set localization.headings=90": (
+        "--set localization.headings=90: localization.headings changes nothing without "
+        "localization.heading=search"
+    ),
+    "run R --preset paper --set localization.patch_m=0.2": "without localization.cost=likelihood",
+    "live R --set refinement.local_search=false --set refinement.local_search_radius_m=1": (
+        "changes nothing without refinement.local_search=true"
+    ),
+    "reproduce --suite fast --set localization.joint_maps=2": "without localization.heading=search",
+    "reproduce --level easy --set localization.joint_maps=2": "without localization.heading=search",
+    "sweep --vary localization.joint_maps=1,4": "without localization.heading=search",
+    "run R --set plane_sweep.smoothing=none --set plane_sweep.step_penalty=1": (
+        "changes nothing without plane_sweep.smoothing=semiglobal"
+    ),
     "sweep --vary rgbd_slam.corners=9,10 --poses oracle": "--poses oracle puts true poses in place",
     "sweep --vary fusion.bins=4,5 --set fusion.bins=6": "--set fusion.bins: --vary gives its value",
     "sweep --vary localization.heading=known,search --heading known": "--heading: --vary gives its",
@@ -95,6 +118,8 @@ def test_the_same_words_where_they_change_something() -> None:
     assert settings_of(oracle).oracle.noise_mm == 2
     search = "run R --heading search --set localization.headings=90"
     assert settings_of(search).localization.heading == "search"
+    ordered = "live R --set localization.headings=90 --set localization.heading=search"
+    assert settings_of(ordered).localization.headings == 90
 
 
 def test_a_file_serves_every_verb(tmp_path: Path) -> None:
@@ -110,6 +135,35 @@ def test_a_sweep_varies_what_another_option_leaves_open(tmp_path: Path) -> None:
         vary=("localization.particles=50,80",), out=tmp_path, poses="oracle", north="search"
     )
     assert len(swept.plan().points()) == 2
+    headings = Sweep(
+        vary=("localization.heading=known,search",),
+        overrides=("localization.headings=90",),
+        out=tmp_path,
+    )
+    assert len(headings.plan().points()) == 2
+
+
+def test_a_level_and_a_suite_switch_on_what_searches_headings(tmp_path: Path) -> None:
+    for words in ("--level hard", "--suite hard"):
+        parsed = cli.parse(
+            "reproduce", [*words.split(), "--set", "localization.headings=90", "--out", "out"]
+        )
+        assert isinstance(parsed, Reproduce)
+        plan = parsed.plan() if parsed.suite is None else parsed.suite_plan(parsed.suite)
+        assert plan.setups[0].config.localization.headings == 90
+
+
+def test_every_switch_is_a_parameter_that_can_be_off() -> None:
+    for name, (switch, on) in SWITCH_OF.items():
+        section, _, key = switch.partition(".")
+        for other in (name, switch):
+            part, _, field = other.partition(".")
+            assert field in type(getattr(Config(), part)).model_fields
+        off = not on if isinstance(on, bool) else OTHER_WORDS[switch]
+        config = with_value(Config(), section, key, off, "test")
+        assert switched_off(config, name).startswith(f"{name} changes nothing without {switch}=")
+        assert switched_off(config, name, [switch]) == ""
+        assert switched_off(with_value(config, section, key, on, "test"), name) == ""
 
 
 def test_the_sections_that_each_verb_uses() -> None:
