@@ -22,8 +22,8 @@ airground run RECORDING --config results/a/config.toml --out DIR
 ```
 
 `--config` takes a file in the form of the `config.toml` that every run leaves: `preset`, and one
-table for each section below. What it leaves out stays as the preset has it. `--set` comes last. `--set` of a parameter that
-another one switches off ("only with") is refused; a file may have it.
+table for each section below. What it leaves out stays as the preset has it. `--set` comes last.
+`--set` of a parameter that another one switches off ("only with") is refused; a file may have it.
 """
 
 
