@@ -7,7 +7,6 @@ takes them in order of time. No tracker waits for the mapper.
 from __future__ import annotations
 
 import logging
-import os
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack
@@ -24,6 +23,7 @@ from evaluation.run.driver import drive, pipeline_for
 from evaluation.run.drops import SCHEMA, DropList, Stamps, fingerprint
 from evaluation.run.live.arrivals import Stream, in_order
 from evaluation.run.live.playback import LiveTask, Playback, PlaybackClock, RobotReport, play_robot
+from evaluation.run.live.priority import lowest_priority
 from evaluation.run.live.stamped_times import StampedTimes
 from evaluation.run.onlooker import Seen
 from evaluation.run.recording import RunResult, RunRows
@@ -38,10 +38,6 @@ from sim.recording.truth import Truth
 
 START_NS = 300_000_000
 """Time from the start order to the first image [ns]: the order reaches both processes by then."""
-
-MAPPER_NICENESS = 19
-"""Niceness of the mapper, the most there is: its threads take the cores only while no tracker wants
-one. With 5 they had a quarter of a core beside a tracker, and poses came late."""
 
 REPORT_S = 30.0
 """Longest wait for a robot's report after its last frame [s]."""
@@ -143,9 +139,9 @@ class LiveTracking(AbstractContextManager["LiveTracking"]):
         with ExitStack() as stack:
             for robot in BOTH:
                 self._start(robot, stack)
+            # Not before: the trackers would inherit it.
+            stack.enter_context(lowest_priority())
             self._stack = stack.pop_all()
-        own = os.getpriority(os.PRIO_PROCESS, 0)
-        os.setpriority(os.PRIO_PROCESS, 0, max(own, MAPPER_NICENESS))
 
     def _start(self, robot: Source, stack: ExitStack) -> None:
         playback, receiver = self._playback, Receiver()
