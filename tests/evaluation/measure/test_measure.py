@@ -103,7 +103,13 @@ def test_a_task_that_kills_every_worker_is_an_error(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.subject("evaluation/measure/work/crew.py", "airground/errors.py")
+@pytest.mark.subject(
+    "evaluation/measure/work",
+    "evaluation/setup",
+    "evaluation/table",
+    "airground/errors.py",
+    but={"airground/config.py": "units are made up", "evaluation/measure/protocol": "likewise"},
+)
 def test_workers_that_die_as_they_start_are_an_error(
     tmp_path: Path,
 ) -> None:
