@@ -143,7 +143,7 @@ def test_a_sweep_varies_what_another_option_leaves_open(tmp_path: Path) -> None:
     assert len(headings.plan().points()) == 2
 
 
-def test_a_level_and_a_suite_switch_on_what_searches_headings(tmp_path: Path) -> None:
+def test_a_level_and_a_suite_switch_on_what_searches_headings() -> None:
     for words in ("--level hard", "--suite hard"):
         parsed = cli.parse(
             "reproduce", [*words.split(), "--set", "localization.headings=90", "--out", "out"]
