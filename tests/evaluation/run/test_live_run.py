@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import cv2
@@ -94,6 +96,31 @@ def test_a_live_run_with_drops_is_reproduced_offline(recording: Recording) -> No
     assert summary.mav.lost == len(drops.unmapped.mav) == 4 - summary.mav.dropped
     assert summary.mav.mapped_ms.n == 0
     assert_same(live, run_recording(recording, truth, SETUP, 0, drops))
+
+
+def test_the_mapper_is_idle_to_the_scheduler_and_the_trackers_are_not(
+    recording: Recording, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[tuple[int, ...]] = []
+
+    def watched(
+        streams: Mapping[Source, Stream], clock: PlaybackClock, patience_s: float
+    ) -> Iterator[TrackedFrame]:
+        trackers = [child.pid or 0 for child in multiprocessing.active_children()]
+        assert len(trackers) == 2
+        for frame in in_order(streams, clock, patience_s):
+            seen.append(tuple(os.sched_getscheduler(pid) for pid in (0, *trackers)))
+            yield frame
+
+    def body() -> None:
+        playback = Playback(rate=1.0, waiting_frames=100, patience_s=PATIENCE_S)
+        run_live(recording, Truth.open(recording.path), SETUP, 0, playback)
+
+    monkeypatch.setattr(live_run, "in_order", watched)
+    usual = os.sched_getscheduler(0)
+    with ThreadPoolExecutor(1) as pool:  # whose priority ends with it
+        pool.submit(body).result()
+    assert set(seen) == {(os.SCHED_IDLE, usual, usual)}
 
 
 def test_forged_messages_are_dropped_and_counted_at_the_end(
