@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import Future, as_completed
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any, TypeVar
@@ -17,8 +15,9 @@ from numpy.typing import NDArray
 
 from airground.errors import AirgroundError
 from airground.io.png_encoder import encode_png
-from sim.interrupts import deaf_children, end_with_parent
+from sim.interrupts import end_with_parent
 from sim.recording.frames import FrameMaker, FramePlan, Written
+from sim.recording.process_pool import ProcessDied, ProcessPool
 from sim.recording.render import draw_with
 from sim.robots.motion import ROBOTS, Robot
 
@@ -36,21 +35,16 @@ class FrameWorkers:
     def __init__(self, count: int) -> None:
         self.count = count
         threads = max(len(os.sched_getaffinity(0)) // count, 1)
-        spawn = multiprocessing.get_context("spawn")
-        self._pool = ProcessPoolExecutor(count, spawn, _start_worker, (threads,))
-        others = set(multiprocessing.active_children())
-        with deaf_children():  # all processes start with the first task
-            self._pool.submit(_nothing)
-        self._processes = set(multiprocessing.active_children()) - others
+        self._pool = ProcessPool(count, _start_worker, threads)
 
     def __enter__(self) -> FrameWorkers:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
-        if kind is not None:
-            for process in self._processes:  # their results are not needed any more
-                process.terminate()
-        self._pool.shutdown(cancel_futures=True)
+        if kind is None:
+            self._pool.close()
+        else:
+            self._pool.kill()  # results are not needed any more
 
     def submit(self, work: Callable[..., Result], *arguments: Any) -> Future[Result]:
         """Have one of the processes do something."""
@@ -89,7 +83,7 @@ def make_frames(plan: FramePlan, pool: FrameWorkers | None) -> Iterator[list[Wri
         futures = [pool.submit(_work, plan, task) for task in tasks]
         for future in as_completed(futures):
             yield future.result()
-    except BrokenProcessPool:
+    except ProcessDied:
         raise pool.died() from None
 
 
@@ -122,7 +116,7 @@ def make_pictures(
     try:
         for future in as_completed([pool.submit(_work_on_pictures, plan, t) for t in tasks]):
             yield future.result()
-    except BrokenProcessPool:
+    except ProcessDied:
         raise pool.died() from None
 
 
@@ -154,7 +148,7 @@ class FrameServer:
         try:
             self._draw_ahead(robot, index)
             return self._ahead[robot].pop(index).result()
-        except BrokenProcessPool:
+        except ProcessDied:
             raise self._pool.died() from None
 
     def _draw_ahead(self, robot: Robot, index: int) -> None:
@@ -196,10 +190,6 @@ def _start_worker(threads: int) -> None:
     end_with_parent()
     draw_with(threads)
     cv2.setNumThreads(1)
-
-
-def _nothing() -> None:
-    """The first task."""
 
 
 def _maker_of(plan: FramePlan) -> FrameMaker:

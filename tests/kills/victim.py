@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,8 +19,8 @@ NAMES = ("psm_*", "sem.*")
 MAIN = "from evaluation.cli import main; main()"
 END_S = 20.0
 """Longest time until the processes of a killed command have ended [s]."""
-LONGEST_S = 1800.0
-"""Longest time of a command, on a busy machine [s]."""
+LONGEST_S = 900.0
+"""Longest time of a command, on a busy machine [s]; one that goes on for longer is stuck."""
 KEPT = "airground-*-*.lock"
 """Lock files of compiling, which stay among temporary files."""
 
@@ -87,13 +88,15 @@ class Command:
             process.wait(after_s)
         except subprocess.TimeoutExpired:
             hit = send(number, wanted, process.pid, choice)
-        code = process.wait(LONGEST_S)
+        with suppress(subprocess.TimeoutExpired):  # its processes are then among what is left
+            process.wait(LONGEST_S)
         end = time.monotonic() + END_S
         while session(process.pid) and time.monotonic() < end:
             time.sleep(0.05)
         processes = tuple(name_of(pid) for pid in session(process.pid))
         for pid in session(process.pid):
             os.kill(pid, signal.SIGKILL)
+        code = process.wait()
         new = (shared_names() - before, self.temporary() - scratch, self.beside() - unfinished)
         return code, hit, Left(processes, *map(tuple, new))
 
