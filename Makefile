@@ -41,6 +41,7 @@ check: $(READY)
 docs: $(READY)
 	$(PYTHON_IN_VENV) docs/parameters.py
 	$(PYTHON_IN_VENV) docs/metrics.py
+	$(PYTHON_IN_VENV) docs/measured_levels.py
 	.venv/bin/sphinx-build -W --keep-going -q -b html docs results/docs
 
 # Did a change make it worse? Each suite against its accepted figures; docs/check_a_change.md.

@@ -206,8 +206,8 @@ class Localization(Section):
     """If the heading is searched, so many newest aerial surfaces are laid over the ground map as
     one."""
     estimate: Literal["mean", "mode"] = "mode"
-    """Reported position: mean of all particles, or of those around the densest place; with `mode`
-    and a searched heading, moved to the nearby pose where the heights fit best."""
+    """Reported pose: mean of all particles; or of those around the densest place, moved to the
+    nearby position and heading, known or searched, where the heights fit best."""
     redrawn_fraction: Fraction = 0.1
     """Share of the particles that each update draws from the current cost map."""
     min_mode_share: Fraction = 0.6

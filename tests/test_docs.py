@@ -193,6 +193,12 @@ def test_the_page_of_metrics_is_that_of_the_table() -> None:
     assert page == made, "the table of metrics has changed: run docs/metrics.py, or make docs"
 
 
+def test_the_page_of_measured_levels_is_that_of_the_runs_kept() -> None:
+    made = runpy.run_path(str(ROOT / "docs" / "measured_levels.py"))["page"]()
+    page = (ROOT / "docs" / "measured_levels.md").read_text(encoding="utf-8")
+    assert page == made, "runs or tables have changed: run docs/measured_levels.py, or make docs"
+
+
 def test_every_row_of_the_parameters_stands_alone() -> None:
     page = (ROOT / "docs" / "parameters.md").read_text(encoding="utf-8")
     rows = [line for line in page.splitlines() if line.startswith("| `")]

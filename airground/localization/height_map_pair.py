@@ -15,6 +15,7 @@ from airground.core.height_map import make_height_map
 from airground.errors import InputError
 from airground.localization.cost_map import Overlays, overlay_at, overlay_turned, reach_of
 from airground.localization.hypotheses import CostVolume, search_headings, search_positions
+from airground.localization.nearby_minimum import lowest_nearby
 from airground.localization.pose_errors import PoseErrors
 
 
@@ -110,6 +111,23 @@ class HeightMapPair:
         if self.searched:
             return overlay_turned(self.aerial, self.ground, particles)
         return overlay_at(self.aerial, self.ground, particles[:, :2])
+
+    def overlay_as_posed(self, pose: F64) -> Overlays:
+        """The aerial heights laid on the ground's at x, y [m] and heading [rad], which need not be
+        the known one."""
+        return overlay_turned(self.aerial, self.ground, (pose - self._turned)[None])
+
+    def lowest_nearby(self, estimate: F64) -> F64:
+        """The pose (3,) around an estimate at which the heights fit best. A known heading is turned
+        too: magnetometers are off by a degree or two."""
+        relative = estimate - self._turned
+        found = lowest_nearby(self.aerial, self.ground, relative, self.config.localization)
+        return found + self._turned
+
+    @property
+    def _turned(self) -> F64:
+        """What the aerial height map is turned by already, as a pose."""
+        return np.array([0.0, 0.0, self.turn])
 
 
 def aerial_height_map(

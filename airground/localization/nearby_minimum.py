@@ -39,7 +39,7 @@ def lowest_nearby(aerial: HeightMap, ground: HeightMap, estimate: F64, config: L
     Args:
         aerial: Heights around the MAV's camera, for heading 0.
         ground: Heights in the frame `ground`.
-        estimate: x, y [m] of the camera and heading [rad].
+        estimate: x, y [m] of the camera and heading [rad], from that of `aerial`.
         config: Section `localization`.
 
     Returns:

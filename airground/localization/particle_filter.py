@@ -18,7 +18,6 @@ from airground.localization.claim import Fit, why_refused
 from airground.localization.cost_map import Overlays
 from airground.localization.height_map_pair import HeightMapPair
 from airground.localization.hypotheses import CostVolume
-from airground.localization.nearby_minimum import lowest_nearby
 from airground.localization.particles import densest_mode, mean_pose, resample, span, weights
 from airground.localization.self_similarity import why_ambiguous
 
@@ -113,9 +112,9 @@ class MonteCarloLocalizer:
         overlay = pair.overlay(estimate[None])
         # Judged where the particles are: no search for a better fit has favoured that place.
         refusal = self._why_refused(pair, particles, estimate, overlay)
-        if pair.searched and self._local.estimate == "mode":
-            estimate = lowest_nearby(pair.aerial, pair.ground, estimate, self._local)
-            overlay = pair.overlay(estimate[None])
+        if self._local.estimate == "mode":
+            estimate = pair.lowest_nearby(estimate)
+            overlay = pair.overlay_as_posed(estimate)
         offset = float(overlay.height_offsets()[0])
         return Belief(
             stamp_ns=pair.stamp_ns,

@@ -66,12 +66,23 @@ def test_best_converges_on_the_truth(flight):
     found = beliefs(flight.localize(Config()))
     for belief, place in zip(found, PATH, strict=True):
         assert np.hypot(*(belief.estimate[:2] - place)) < 0.1
-        assert belief.estimate[2] == pytest.approx(HEADING)
+        assert belief.estimate[2] == pytest.approx(HEADING, abs=np.deg2rad(1.0))
     last = found[-1]
     assert last.converged, last.refusal
     assert last.height_offset == pytest.approx(-0.3, abs=0.03)
     corner = np.array([0.4, 0.1, 0.5])
     np.testing.assert_allclose(last.T_ground_mav @ (T_MAV_WORLD @ corner), corner, atol=0.12)
+
+
+@pytest.mark.parametrize("off_deg", [-3.0, 3.0])
+def test_a_known_heading_that_is_off_is_turned_right(flight, off_deg):
+    """The particles keep the magnetometers' heading; the reported pose fits the heights."""
+    heading = HEADING + np.deg2rad(off_deg)
+    for found in beliefs(flight.localize(Config(), heading)):
+        np.testing.assert_allclose(found.particles[:, 2], heading)
+        assert abs(np.rad2deg(found.estimate[2] - HEADING)) < 1.5
+    as_known = beliefs(flight.localize(changed(Config(), estimate="mean"), heading))
+    assert all(found.estimate[2] == pytest.approx(heading) for found in as_known)
 
 
 def test_searched_heading_finds_position_and_turn(flight):

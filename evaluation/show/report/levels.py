@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from evaluation.judge.claims import TO_BE_FOUND, localization_claims
-from evaluation.judge.metrics import METRICS
+from evaluation.judge.metrics import HEADING_DEG, METRICS
 from evaluation.judge.readings import median, rate
 from evaluation.judge.results import AtLevel
 from evaluation.measure.baselines.table import BASELINES
@@ -22,7 +22,7 @@ from evaluation.table.intervals import Rate, quantile, wilson
 from evaluation.table.limits import FOURTH_MAP, LOCATED_M
 from evaluation.table.rows import ResultTable
 
-SUCCESS = METRICS["within_25cm_4"]
+SUCCESS, POSED = METRICS["within_25cm_4"], METRICS["posed_4"]
 PRESETS = ("best", "paper", "paper_literal")
 PER_MAP = ("cost_map", "particles")
 """Stages of ours that work once an aerial map."""
@@ -34,12 +34,14 @@ class Achieved:
 
     Attributes:
         success: Best guesses within 0.25 m of the truth.
+        posed: Those that are also within 3 deg of the true heading, or turn.
         error_m: Median horizontal error of the best guess [m]; infinite where most have none.
-        wrong: Claims beyond that, of all claims.
+        wrong: Claims beyond 0.25 m, of all claims.
         ms: Median time per aerial map [ms].
     """
 
     success: Rate
+    posed: Rate
     error_m: float
     wrong: Rate
     ms: float
@@ -51,16 +53,44 @@ class Achieved:
         return f"{self.success.text()}\n{median_error}\n{wrong}"
 
 
+@dataclass(frozen=True)
+class Method:
+    """A method at each of several levels.
+
+    Attributes:
+        title: Name of a preset of ours, or title of a baseline.
+        maps: Number of aerial maps that it has had.
+        achieved: What it achieved at each level; None where it was not tried.
+    """
+
+    title: str
+    maps: int
+    achieved: tuple[Achieved | None, ...]
+
+
+def presets_at(levels: Sequence[AtLevel]) -> list[Method]:
+    """Presets that were tried, after four aerial maps; the poses are from SLAM."""
+    made = (
+        Method(name, FOURTH_MAP, tuple(_of_preset(one, name) for one in levels)) for name in PRESETS
+    )
+    return [method for method in made if any(method.achieved)]
+
+
+def baselines_at(levels: Sequence[AtLevel]) -> list[Method]:
+    """Baselines that were tried, after one aerial map."""
+    made = (
+        Method(b.title, 1, tuple(_of_baseline(one, b.name) for one in levels)) for b in BASELINES
+    )
+    return [method for method in made if any(method.achieved)]
+
+
 def level_table(levels: Sequence[AtLevel]) -> TextTable:
-    """One row per method, one column per level; no rows for fewer than two levels. Presets have had
-    four aerial maps, baselines one; the poses are from SLAM."""
+    """One row per method, one column per level; no rows for fewer than two levels."""
     if len(levels) < 2:
         return TextTable((), ())
+    methods = [*presets_at(levels), *baselines_at(levels)]
     header = ("method", "aerial maps", *(str(one.level) for one in levels))
-    presets = [(name, [_of_preset(one, name) for one in levels]) for name in PRESETS]
-    rivals = [(b.title, [_of_baseline(one, b.name) for one in levels]) for b in BASELINES]
-    rows = [(name, str(FOURTH_MAP), *_cells(found)) for name, found in presets if any(found)]
-    rows += [(title, "1", *_cells(found)) for title, found in rivals if any(found)]
+    rows = ((method.title, str(method.maps), *_cells(method.achieved)) for method in methods)
     return TextTable(header, tuple(rows))
 
 
@@ -69,21 +99,19 @@ def level_figures(levels: Sequence[AtLevel]) -> list[ReportFigure]:
     """Success of presets and of baselines, with intervals; none for fewer than two levels."""
     if len(levels) < 2:
         return []
-    rivals = {b.title: [_of_baseline(one, b.name) for one in levels] for b in BASELINES}
-    rivals = {title: found for title, found in rivals.items() if any(found)}
+    rivals = baselines_at(levels)
     return [_presets_figure(levels), *([_rivals_figure(levels, rivals)] if rivals else [])]
 
 
 def _presets_figure(levels: Sequence[AtLevel]) -> ReportFigure:
     figure = Figure(figsize=(COLUMN_IN, 2.6), layout="constrained")
     axes = figure.subplots()
-    made = {name: [_of_preset(one, name) for one in levels] for name in PRESETS}
-    made = {name: found for name, found in made.items() if any(found)}
-    for index, ((preset, found), colour) in enumerate(zip(made.items(), SERIES, strict=False)):
-        shift = 0.08 * (index - (len(made) - 1) / 2)
-        places, shares, spans = _bars(found)
+    presets = presets_at(levels)
+    for index, (preset, colour) in enumerate(zip(presets, SERIES, strict=False)):
+        shift = 0.08 * (index - (len(presets) - 1) / 2)
+        places, shares, spans = _bars(preset.achieved)
         axes.errorbar(
-            places + shift, shares, spans, color=colour, marker="o", capsize=2, label=preset
+            places + shift, shares, spans, color=colour, marker="o", capsize=2, label=preset.title
         )
     axes.set_xticks(range(len(levels)), [str(one.level) for one in levels])
     axes.set(ylim=(-3, 103), ylabel=f"{SUCCESS.title} [%]")
@@ -95,16 +123,14 @@ def _presets_figure(levels: Sequence[AtLevel]) -> ReportFigure:
     return ReportFigure("levels", "Success against level", caption, figure, wide=False)
 
 
-def _rivals_figure(
-    levels: Sequence[AtLevel], rivals: dict[str, list[Achieved | None]]
-) -> ReportFigure:
+def _rivals_figure(levels: Sequence[AtLevel], rivals: Sequence[Method]) -> ReportFigure:
     figure = Figure(
         figsize=(WIDE_IN, 0.8 + 0.07 * (1 + len(levels)) * len(rivals)), layout="constrained"
     )
     axes = figure.subplots()
     colours = colormaps["viridis"](np.linspace(0.85, 0.0, len(levels)))  # harder is darker
-    for row, found in enumerate(rivals.values()):
-        places, shares, spans = _bars(found)
+    for row, rival in enumerate(rivals):
+        places, shares, spans = _bars(rival.achieved)
         for level, share, span in zip(places.astype(int), shares, spans.T, strict=True):
             at = row + (level - (len(levels) - 1) / 2) / (1 + len(levels))
             axes.errorbar(
@@ -112,7 +138,7 @@ def _rivals_figure(
             )
     for level, one in enumerate(levels):
         axes.errorbar([], [], color=colours[level], marker="o", label=str(one.level))
-    axes.set_yticks(range(len(rivals)), list(rivals))
+    axes.set_yticks(range(len(rivals)), [rival.title for rival in rivals])
     axes.invert_yaxis()
     axes.set(xlim=(-3, 103), xlabel=f"best guess within {LOCATED_M:g} m after one aerial map [%]")
     axes.grid(axis="x")
@@ -147,7 +173,7 @@ def _of_preset(one: AtLevel, preset: str) -> Achieved | None:
             wrong = wilson(0, 0) if claims is None else claims.wrong
             ms = sum(quantile(table.values("timing", stage), 0.5) for stage in PER_MAP)
             error_m = median(METRICS["localization_4"], table)
-            return Achieved(rate(SUCCESS, table), error_m, wrong, ms)
+            return Achieved(rate(SUCCESS, table), rate(POSED, table), error_m, wrong, ms)
     return None
 
 
@@ -165,8 +191,10 @@ def _achieved(table: ResultTable, name: str) -> Achieved | None:
     if trials.empty:
         return None
     near, claimed = trials["horizontal_m"] <= LOCATED_M, trials["claimed"] > 0
+    posed = near & (trials["rotation_deg"] <= HEADING_DEG)
     return Achieved(
         wilson(int(near.sum()), len(trials)),
+        wilson(int(posed.sum()), len(trials)),
         quantile(trials["horizontal_m"], 0.5),
         wilson(int((claimed & ~near).sum()), int(claimed.sum())),
         quantile(trials["ms"], 0.5),

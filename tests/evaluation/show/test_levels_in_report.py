@@ -9,7 +9,7 @@ from airground.config import Config
 from evaluation.judge.results import AtLevel, Results, merged
 from evaluation.setup.level_mark import LevelMark
 from evaluation.setup.text import MISSING
-from evaluation.show.report.levels import level_figures, level_table
+from evaluation.show.report.levels import baselines_at, level_figures, level_table, presets_at
 from evaluation.show.report.page import write_results
 from evaluation.table.rows import ResultTable, Row
 from tests.evaluation.judge.flights import CONDITION, make_results
@@ -40,7 +40,7 @@ def test_success_falls_from_level_to_level() -> None:
     assert figure.name == "levels"
 
 
-def rivals(mark: LevelMark, near: int, trials: int = 8) -> ResultTable:
+def rivals(mark: LevelMark, near: int, trials: int = 8, turned_deg: float = 1.0) -> ResultTable:
     """A baseline that claims all its guesses, of which so many are right."""
     condition = replace(CONDITION, variant="" if mark.name == "easy" else f"level {mark}")
     return ResultTable.from_rows(
@@ -50,7 +50,7 @@ def rivals(mark: LevelMark, near: int, trials: int = 8) -> ResultTable:
             ("claimed", 1.0),
             ("horizontal_m", 0.1 if trial < near else 2.0),
             ("translation_m", 0.1),
-            ("rotation_deg", 1.0),
+            ("rotation_deg", turned_deg),
             ("ms", 40.0),
         )
     )
@@ -69,6 +69,18 @@ def test_baselines_are_held_against_levels_too() -> None:
     assert hard.splitlines()[0].startswith("25")
     assert hard.splitlines()[2:] == ["2.00 m, 40.0 ms", "wrong claims: 6 of 8"]
     assert [figure.name for figure in level_figures(levels)] == ["levels", "levels_rivals"]
+
+
+def test_a_guess_at_the_right_place_may_be_turned() -> None:
+    easy = results_at(MARKS[0], 1.0)
+    for turned_deg, right in ((2.9, 6), (3.1, 0)):
+        tried = rivals(MARKS[0], 6, turned_deg=turned_deg)
+        levels = [AtLevel(MARKS[0], ResultTable.concat([easy.table, tried]))]
+        (sift,), (best,) = baselines_at(levels), presets_at(levels)
+        (achieved,) = sift.achieved
+        assert achieved is not None
+        assert (achieved.success.successes, achieved.posed.successes) == (6, right)
+        assert (sift.maps, best.maps) == (1, 4)
 
 
 def test_what_was_not_measured_at_a_level_is_left_open() -> None:
