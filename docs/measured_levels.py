@@ -1,7 +1,8 @@
 """Writes `measured_levels.md`, the tables of measured levels, from the runs kept beside it.
 
-python docs/measured_levels.py                       # the page anew
-python docs/measured_levels.py keep RUN LEVEL/NAME   # keep a run of reproduce --level
+- `python docs/measured_levels.py`: writes the page anew.
+- `python docs/measured_levels.py keep RUN NAME`: keeps a run of `reproduce --level` under this name
+  first, such as the name of its preset.
 """
 
 import shutil
@@ -9,11 +10,14 @@ import sys
 from collections import Counter
 from pathlib import Path
 
+from airground.errors import InputError
 from evaluation.judge import samples
-from evaluation.judge.results import CONFIG, SUMMARY, TABLE, merged, read_results
+from evaluation.judge.results import CONFIG, SUMMARY, TABLE, AtLevel, merged, read_results
 from evaluation.judge.summary import Summary
 from evaluation.measure.protocol.negatives import CASES
-from evaluation.setup.text import TextTable, markdown_table, metres, milliseconds
+from evaluation.setup.console import EXIT_ERROR
+from evaluation.setup.output import fresh_folder
+from evaluation.setup.text import TextTable, in_brackets, markdown_table, metres, milliseconds
 from evaluation.show.report.calibration import calibration_table, claims_table
 from evaluation.show.report.levels import PER_MAP, Method, baselines_at, presets_at
 from evaluation.show.report.trajectories import trajectory_table
@@ -34,7 +38,7 @@ INTRODUCTION = """\
 What every method achieved at each [level](levels.md#measuring-a-level). `make docs` writes this
 page from the runs that are kept in `docs/measured_levels/`; a test checks that it is up to date.
 Intervals are 95 %, by Wilson, and take cases as independent. A method without a guess is wrong.
-Times are medians on one core, while the other one measures another flight.
+Times are medians on one core, while the other one is as busy.
 """
 HEADER = (
     "method",
@@ -47,53 +51,52 @@ HEADER = (
 )
 
 
-def page() -> str:
-    """The whole page."""
-    lines = [INTRODUCTION, *(line for level in LEVELS for line in _level(RUNS / level))]
+def page(kept: Path = RUNS) -> str:
+    """The whole page, of the runs in `kept`."""
+    runs = sorted(summary.parent for summary in kept.glob(f"*/*/{SUMMARY}"))
+    levels = merged([read_results(run) for run in runs]).levels if runs else ()
+    summaries = [Summary.read(run / SUMMARY) for run in runs]
+    lines = [INTRODUCTION]
+    for one in sorted(levels, key=lambda one: (LEVELS.index(one.level.name), one.level.version)):
+        lines += _level(one, [summary for summary in summaries if summary.level == one.level])
     return "\n".join([*lines, ""])
 
 
-def keep(run: Path, name: str) -> None:
-    """Copy what the tables need of a run of `reproduce --level`, as a run of fewer rows."""
-    frame = read_results(run).table.frame
+def keep(run: Path, name: str, kept: Path = RUNS) -> None:
+    """Copy what the tables need of a run into a folder of its level, as a run of fewer rows.
+
+    Raises:
+        InputError: `run` is none of a level, `name` is no name of a folder, or the level has a run
+            of this name already.
+    """
+    if Path(name).name != name:
+        raise InputError(f"{name}: expected the name of a folder, such as best")
+    results = read_results(run)
+    if results.level is None:
+        raise InputError(f"{run}: states no level; expected a run of reproduce --level")
+    frame = results.table.frame
     timed = (frame["stage"] == "timing") & frame["metric"].isin(PER_MAP)
-    kept = RUNS / name
-    kept.mkdir(parents=True, exist_ok=True)
     table = frame[frame["stage"].isin(STAGES) | timed]
-    table.to_parquet(kept / TABLE, index=False, compression="zstd", compression_level=19)
-    for file in (CONFIG, SUMMARY):
-        shutil.copyfile(run / file, kept / file)
+    with fresh_folder(kept / results.level.name / name) as folder:
+        table.to_parquet(folder / TABLE, index=False, compression="zstd", compression_level=19)
+        for file in (CONFIG, SUMMARY):
+            shutil.copyfile(run / file, folder / file)
 
 
-def _level(folder: Path) -> list[str]:
-    runs = sorted(folder.glob(f"*/{SUMMARY}"))
-    if not runs:
-        return []
-    (level,) = merged([read_results(run.parent) for run in runs]).levels
-    best = next(c for c in level.table.conditions() if (c.preset, c.poses) == ("best", "slam"))
-    measured = level.table.of(best)
-    lines = [f"## `{level.level.name}` {level.level.version}", ""]
-    lines += [_conditions(measured, [Summary.read(run) for run in runs]), ""]
+def _level(level: AtLevel, summaries: list[Summary]) -> list[str]:
+    lines = [f"## `{level.level.name}` {level.level.version}", "", _conditions(summaries), ""]
     lines += markdown_table(HEADER, [_row(m) for m in presets_at([level]) + baselines_at([level])])
-    lines += ["", "What `best` claims, and how well it knows its errors:", ""]
-    lines += [*_table(claims_table(measured)), ""]
-    found = calibration_table(measured)
-    lines += [*_table(TextTable(("beliefs of best", *found.header[1:]), found.rows)), ""]
-    return [*lines, *_table(_consistency(measured)), ""]
+    for condition in level.table.conditions():
+        if (condition.preset, condition.poses) == ("best", "slam"):
+            lines += ["", *_of_best(level.table.of(condition))]
+    return [*lines, ""]
 
 
-def _conditions(measured: ResultTable, summaries: list[Summary]) -> str:
-    counts = Counter(flight.scene for flight in samples.flights(measured))
-    flights = ", ".join(f"`{scene}` {count}" for scene, count in counts.items())
-    seeds = sorted({summary.seed for summary in summaries})
-    revisions = sorted({summary.git_revision for summary in summaries})
+def _conditions(summaries: list[Summary]) -> str:
+    revisions = ", ".join(sorted({summary.git_revision for summary in summaries}))
+    seeds = ", ".join(map(str, sorted({summary.seed for summary in summaries})))
     machines = sorted({f"{s.machine.cores} cores of {s.machine.cpu}" for s in summaries})
-    nothing = ", ".join(scene for scene in counts if scene in CONTROL_SCENES)
-    return (
-        f"Revision {', '.join(revisions)}, `--seed {', '.join(map(str, seeds))}`, "
-        f"{', '.join(machines)}. Flights of `best`: {flights}"
-        + (f"; in `{nothing}` there is nothing to find." if nothing else ".")
-    )
+    return f"Revision {revisions}, `--seed {seeds}`, {', '.join(machines)}."
 
 
 def _row(method: Method) -> tuple[str, ...]:
@@ -102,12 +105,27 @@ def _row(method: Method) -> tuple[str, ...]:
     return (
         method.title,
         str(method.maps),
-        _in_line(made.success.text()),
+        in_brackets(made.success.text()),
         f"{made.posed.successes} of {made.posed.total}",
         metres(made.error_m),
         f"{made.wrong.successes} of {made.wrong.total}",
         milliseconds(made.ms),
     )
+
+
+def _of_best(measured: ResultTable) -> list[str]:
+    """Claims of preset best, and how well it knows its errors."""
+    flights = Counter(flight.scene for flight in samples.flights(measured))
+    counts = ", ".join(f"`{scene}` {count}" for scene, count in flights.items())
+    empty = ", ".join(f"`{scene}`" for scene in flights if scene in CONTROL_SCENES)
+    nothing = f"; in {empty} there is nothing to find" if empty else ""
+    beliefs = calibration_table(measured.scored())
+    return [
+        f"What `best` claims, and how well it knows its errors. Flights: {counts}{nothing}.",
+        *("", *_table(claims_table(measured))),
+        *("", *_table(TextTable(("beliefs of best", *beliefs.header[1:]), beliefs.rows))),
+        *("", *_table(_consistency(measured))),
+    ]
 
 
 def _consistency(measured: ResultTable) -> TextTable:
@@ -118,16 +136,24 @@ def _consistency(measured: ResultTable) -> TextTable:
 
 
 def _table(table: TextTable) -> list[str]:
-    return markdown_table(table.header, [tuple(map(_in_line, row)) for row in table.rows])
+    return markdown_table(table.header, [tuple(map(in_brackets, row)) for row in table.rows])
 
 
-def _in_line(cell: str) -> str:
-    """What follows a line break is detail."""
-    shown, _, detail = cell.partition("\n")
-    return f"{shown} ({detail})" if detail else shown
+def main(words: list[str]) -> None:
+    """The command line."""
+    match words:
+        case []:
+            pass
+        case ["keep", run, name]:
+            keep(Path(run), name)
+        case _:
+            raise InputError(f"{' '.join(words)}: expected nothing, or keep RUN NAME")
+    PAGE.write_text(page(), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["keep"]:
-        keep(Path(sys.argv[2]), sys.argv[3])
-    PAGE.write_text(page(), encoding="utf-8")
+    try:
+        main(sys.argv[1:])
+    except InputError as error:
+        print(f"{Path(__file__).name}: error: {error}", file=sys.stderr)
+        sys.exit(EXIT_ERROR)

@@ -31,6 +31,12 @@ class TextTable:
     rows: tuple[tuple[str, ...], ...]
 
 
+def in_brackets(cell: str) -> str:
+    """A cell of a `TextTable` as one line, with its detail in brackets."""
+    first, *details = cell.split("\n")
+    return f"{first} ({'; '.join(details)})" if details else first
+
+
 def formatted(value: float | None, form: str, infinite: str = FAILED) -> str:
     """A value by a format such as "{:.2f} s"; words where it is missing or infinite."""
     if value is None or math.isnan(value):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 
 from evaluation.judge.results import CONFIG, SUMMARY, TABLE
-from evaluation.setup.text import TextTable
+from evaluation.setup.text import TextTable, in_brackets
 from evaluation.table.rows import ResultTable
 
 BEHIND = {
@@ -82,6 +82,4 @@ _LATEX = {
 
 
 def _escaped(cell: str) -> str:
-    first, *details = cell.split("\n")
-    text = f"{first} ({'; '.join(details)})" if details else first
-    return "".join(_LATEX.get(letter, letter) for letter in text)
+    return "".join(_LATEX.get(letter, letter) for letter in in_brackets(cell))
