@@ -9,6 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from evaluation.setup.text import MISSING, percent
 
+NARROW = 0.01
+"""Width of an interval of shares below which whole percents hide it."""
+
 
 @dataclass(frozen=True)
 class Interval:
@@ -36,8 +39,10 @@ class Rate:
         """The share; on a second line the counts and the interval."""
         if self.total == 0:
             return MISSING
-        interval = f"{100 * self.low:.0f} to {100 * self.high:.0f} %"
-        return f"{percent(self.share)}\n{self.successes} of {self.total}; {interval}"
+        narrow = self.high - self.low < NARROW
+        low, high = (f"{100 * end:.{2 if narrow else 0}f}" for end in (self.low, self.high))
+        share = percent(self.share, 2 if narrow else 1)
+        return f"{share}\n{self.successes} of {self.total}; {low} to {high} %"
 
 
 @dataclass(frozen=True)

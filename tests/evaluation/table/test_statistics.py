@@ -62,3 +62,10 @@ def test_bootstrap_is_the_same_for_the_same_seed() -> None:
     values = [0.1, 0.4, np.nan, 0.2]
     one, two = (median_interval(values, np.random.default_rng(1)) for _ in range(2))
     assert one == two
+
+
+def test_shares_that_hardly_vary_keep_two_decimals() -> None:
+    assert wilson(0, 2484).text() == "0.00 %\n0 of 2484; 0.00 to 0.15 %"
+    assert wilson(2528, 2532).text() == "99.84 %\n2528 of 2532; 99.59 to 99.94 %"
+    assert wilson(2484, 2532).text() == "98.1 %\n2484 of 2532; 97 to 99 %"
+    assert wilson(0, 0).text() == "-"
