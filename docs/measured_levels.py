@@ -1,6 +1,6 @@
 """Writes `measured_levels.md`, the tables of measured levels, from the runs kept beside it.
 
-- `python docs/measured_levels.py`: writes the page anew.
+- `python docs/measured_levels.py`: writes the page and its pictures anew.
 - `python docs/measured_levels.py keep RUN NAME`: keeps a run of `reproduce --level` under this name
   first, such as the name of its preset.
 """
@@ -17,15 +17,31 @@ from evaluation.judge.summary import Summary
 from evaluation.measure.protocol.negatives import CASES
 from evaluation.setup.console import EXIT_ERROR
 from evaluation.setup.output import fresh_folder
-from evaluation.setup.text import TextTable, in_brackets, markdown_table, metres, milliseconds
+from evaluation.setup.text import (
+    MISSING,
+    TextTable,
+    in_brackets,
+    markdown_table,
+    metres,
+    milliseconds,
+)
+from evaluation.show.figures.style import write_png
 from evaluation.show.report.calibration import calibration_table, claims_table
-from evaluation.show.report.levels import PER_MAP, Method, baselines_at, presets_at
+from evaluation.show.report.levels import (
+    PER_MAP,
+    Method,
+    baselines_at,
+    level_figures,
+    presets_at,
+)
 from evaluation.show.report.trajectories import trajectory_table
 from evaluation.table.rows import CONTROL_SCENES, ResultTable
 
 PAGE = Path(__file__).with_suffix(".md")
 RUNS = Path(__file__).with_suffix("")
 """One folder a level, with one folder a run."""
+PICTURES = PAGE.parent / "pictures"
+"""Where the pictures of several levels lie, each named after its figure."""
 LEVELS = ("paper", "easy", "medium", "hard", "extreme")
 STAGES = (
     *("localization", "baseline", "alignment", "refinement", "trajectory", "appearance"),
@@ -53,13 +69,48 @@ HEADER = (
 
 def page(kept: Path = RUNS) -> str:
     """The whole page, of the runs in `kept`."""
-    runs = sorted(summary.parent for summary in kept.glob(f"*/*/{SUMMARY}"))
-    levels = merged([read_results(run) for run in runs]).levels if runs else ()
-    summaries = [Summary.read(run / SUMMARY) for run in runs]
-    lines = [INTRODUCTION]
-    for one in sorted(levels, key=lambda one: (LEVELS.index(one.level.name), one.level.version)):
+    summaries = [Summary.read(run / SUMMARY) for run in _runs(kept)]
+    levels = measured_levels(kept)
+    lines = [INTRODUCTION, *_side_by_side(levels)]
+    for one in levels:
         lines += _level(one, [summary for summary in summaries if summary.level == one.level])
     return "\n".join([*lines, ""])
+
+
+def measured_levels(kept: Path = RUNS) -> list[AtLevel]:
+    """What the runs in `kept` measured, the easiest level first."""
+    runs = _runs(kept)
+    levels = merged([read_results(run) for run in runs]).levels if runs else ()
+    return sorted(levels, key=lambda one: (LEVELS.index(one.level.name), one.level.version))
+
+
+def _runs(kept: Path) -> list[Path]:
+    return sorted(summary.parent for summary in kept.glob(f"*/*/{SUMMARY}"))
+
+
+def _side_by_side(levels: list[AtLevel]) -> list[str]:
+    """Pictures and a table of several levels; nothing of one."""
+    figures = level_figures(levels)
+    if not figures:
+        return []
+    pictures = [
+        line
+        for made in figures
+        for line in (f"![{made.title}](pictures/{made.name}.png)", "", f"*{made.caption}*", "")
+    ]
+    header = ("best guess within 0.25 m", "aerial maps", *(str(one.level) for one in levels))
+    rows = [
+        (
+            method.title,
+            str(method.maps),
+            *(
+                MISSING if made is None else in_brackets(made.success.text())
+                for made in method.achieved
+            ),
+        )
+        for method in presets_at(levels) + baselines_at(levels)
+    ]
+    return ["## All levels", "", *pictures, *markdown_table(header, rows), ""]
 
 
 def keep(run: Path, name: str, kept: Path = RUNS) -> None:
@@ -149,6 +200,8 @@ def main(words: list[str]) -> None:
         case _:
             raise InputError(f"{' '.join(words)}: expected nothing, or keep RUN NAME")
     PAGE.write_text(page(), encoding="utf-8")
+    for made in level_figures(measured_levels()):
+        write_png(made.figure, PICTURES / f"{made.name}.png")
 
 
 if __name__ == "__main__":

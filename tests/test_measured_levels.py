@@ -38,6 +38,7 @@ def test_a_run_is_kept_with_fewer_rows_and_the_same_table(run: Path, tmp_path: P
     assert 0 < len(few) < len(whole)
     page = MEASURED["page"](tmp_path)
     assert "## `hard` 1" in page
+    assert "All levels" not in page
     assert "| best | 4 | 100.0 % (" in page
     assert "`flat` 1, `tiny` 4; in `flat` there is nothing to find." in page
     elsewhere = tmp_path / "whole" / "hard"
@@ -58,8 +59,15 @@ def test_levels_stand_in_order_and_one_without_best_has_its_methods(
     MEASURED["keep"](run, "best", tmp_path / "kept")
     MEASURED["keep"](tmp_path / "easy_run", "paper", tmp_path / "kept")
     page = MEASURED["page"](tmp_path / "kept")
-    assert page.index("## `easy` 1") < page.index("| paper | 4 |") < page.index("## `hard` 1")
+    together, apart = page.split("## `easy` 1")
+    assert apart.index("| paper | 4 |") < apart.index("## `hard` 1") < apart.index("| best | 4 |")
     assert page.count("What `best` claims") == 1
+    assert "![Success against level](pictures/levels.png)" in together
+    assert "| best guess within 0.25 m | aerial maps | easy 1 | hard 1 |" in together
+    best, paper = (line for line in together.splitlines() if line.startswith(("| best |", "| pa")))
+    assert best.startswith("| best | 4 | - | 100.0 % (")
+    assert paper.startswith("| paper | 4 | 100.0 % (")
+    assert paper.endswith(" | - |")
 
 
 def test_nothing_kept_is_a_page_without_levels(tmp_path: Path) -> None:
