@@ -96,11 +96,12 @@ def level_table(levels: Sequence[AtLevel]) -> TextTable:
 
 @styled
 def level_figures(levels: Sequence[AtLevel]) -> list[ReportFigure]:
-    """Success of presets and of baselines, with intervals; none for fewer than two levels."""
+    """Success of presets and of baselines, with intervals; none for fewer than two levels, or
+    where baselines were tried at fewer."""
     if len(levels) < 2:
         return []
-    rivals = baselines_at(levels)
-    return [_presets_figure(levels), *([_rivals_figure(levels, rivals)] if rivals else [])]
+    tried = [one for one in levels if baselines_at([one])]
+    return [_presets_figure(levels), *([_rivals_figure(tried)] if len(tried) > 1 else [])]
 
 
 def _presets_figure(levels: Sequence[AtLevel]) -> ReportFigure:
@@ -123,7 +124,8 @@ def _presets_figure(levels: Sequence[AtLevel]) -> ReportFigure:
     return ReportFigure("levels", "Success against level", caption, figure, wide=False)
 
 
-def _rivals_figure(levels: Sequence[AtLevel], rivals: Sequence[Method]) -> ReportFigure:
+def _rivals_figure(levels: Sequence[AtLevel]) -> ReportFigure:
+    rivals = baselines_at(levels)
     figure = Figure(
         figsize=(WIDE_IN, 0.8 + 0.07 * (1 + len(levels)) * len(rivals)), layout="constrained"
     )
