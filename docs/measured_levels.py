@@ -117,8 +117,8 @@ def keep(run: Path, name: str, kept: Path = RUNS) -> None:
     """Copy what the tables need of a run into a folder of its level, as a run of fewer rows.
 
     Raises:
-        InputError: `run` is none of a level, `name` is no name of a folder, or the level has a run
-            of this name already.
+        InputError: `run` is none of a level, `name` is no name of a folder, the level has a run of
+            this name already, or rows of this run are kept already.
     """
     if Path(name).name != name:
         raise InputError(f"{name}: expected the name of a folder, such as best")
@@ -129,6 +129,7 @@ def keep(run: Path, name: str, kept: Path = RUNS) -> None:
     timed = (frame["stage"] == "timing") & frame["metric"].isin(PER_MAP)
     table = frame[frame["stage"].isin(STAGES) | timed]
     with fresh_folder(kept / results.level.name / name) as folder:
+        merged([results, *map(read_results, _runs(kept))])
         table.to_parquet(folder / TABLE, index=False, compression="zstd", compression_level=19)
         for file in (CONFIG, SUMMARY):
             shutil.copyfile(run / file, folder / file)

@@ -52,18 +52,18 @@ def test_levels_stand_in_order_and_one_without_best_has_its_methods(
     run: Path, tmp_path: Path
 ) -> None:
     results = read_results(run)
-    easy = LevelMark(name="easy", version=1)
+    medium = LevelMark(name="medium", version=1)
     frame = results.table.frame.assign(preset="paper")
-    (tmp_path / "easy_run").mkdir()
-    write_results(replace(results, table=ResultTable(frame), level=easy), tmp_path / "easy_run")
+    (tmp_path / "medium_run").mkdir()
+    write_results(replace(results, table=ResultTable(frame), level=medium), tmp_path / "medium_run")
     MEASURED["keep"](run, "best", tmp_path / "kept")
-    MEASURED["keep"](tmp_path / "easy_run", "paper", tmp_path / "kept")
+    MEASURED["keep"](tmp_path / "medium_run", "paper", tmp_path / "kept")
     page = MEASURED["page"](tmp_path / "kept")
-    together, apart = page.split("## `easy` 1")
+    together, apart = page.split("## `medium` 1")
     assert apart.index("| paper | 4 |") < apart.index("## `hard` 1") < apart.index("| best | 4 |")
     assert page.count("What `best` claims") == 1
     assert "![Success against level](pictures/levels.png)" in together
-    assert "| best guess within 0.25 m | aerial maps | easy 1 | hard 1 |" in together
+    assert "| best guess within 0.25 m | aerial maps | medium 1 | hard 1 |" in together
     best, paper = (line for line in together.splitlines() if line.startswith(("| best |", "| pa")))
     assert best.startswith("| best | 4 | - | 100.0 % (")
     assert paper.startswith("| paper | 4 | 100.0 % (")
@@ -87,8 +87,10 @@ def test_what_cannot_be_kept_is_named_and_leaves_nothing(run: Path, tmp_path: Pa
             MEASURED["keep"](wrong, name, kept)
     assert not kept.exists()
     MEASURED["keep"](run, "best", kept)
-    with pytest.raises(InputError, match="exists"):
-        MEASURED["keep"](run, "best", kept)
+    for name, said in (("best", "exists"), ("again", "is there twice")):
+        with pytest.raises(InputError, match=said):
+            MEASURED["keep"](run, name, kept)
+    assert [folder.name for folder in (kept / "hard").iterdir()] == ["best"]
 
 
 @pytest.mark.parametrize("words", [["keep"], ["keep", "a", "b", "c"], ["keep", "nowhere", "best"]])
