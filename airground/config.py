@@ -178,19 +178,21 @@ class HeightMaps(Section):
 class Localization(Section):
     """Cost map and Monte Carlo localization (Sec. VI)."""
 
-    cost: Literal["zmssd", "ncc", "likelihood"] = "likelihood"
-    """Cost of a hypothesis: Eq. 2, one minus the normalized correlation of the heights, or minus
-    the logarithm of how much likelier the heights are if they correlate so than if not at all."""
-    patch_m: Positive = 0.3
-    """With `likelihood`: side of a patch whose heights count as one measurement [m]."""
+    cost: Literal["zmssd", "ncc", "likelihood", "channels"] = "channels"
+    """Cost of a hypothesis: Eq. 2; one minus the normalized correlation of the heights; minus the
+    logarithm of how much likelier the heights are if they correlate so than if not at all; or the
+    same of the area where they agree, in channels of 0.1 m above the floor."""
+    patch_m: Positive = 0.15
+    """With `likelihood` and `channels`: side of a patch whose heights count as one measurement [m].
+    """
     sigma: Positive = 1.0
-    """Sigma of Eq. 5, in units of the cost (m^2 for zmssd, none for ncc and likelihood)."""
+    """Sigma of Eq. 5, in units of the cost (m^2 for zmssd, none for the others)."""
     sigma_units: Literal["cost", "minmax"] = "cost"
     """Units of sigma: those of the cost, or the range of the costs that are compared (at first
     those of the whole cost map, then those of the particles)."""
     min_overlap: Fraction = 0.15
     """Smallest overlap, as a fraction of the aerial map's filled cells."""
-    search_radius_m: Positive = 3.0
+    search_radius_m: Positive = 4.5
     """Half the side of the square searched around the ground robot [m]."""
     particles: Annotated[int, Field(ge=2)] = 200
     """M of Eq. 4."""
@@ -203,12 +205,12 @@ class Localization(Section):
     heading_noise_deg: Positive = 1.0
     """Standard deviation of the heading's motion model, if searched [deg]."""
     joint_maps: Count = 4
-    """If the heading is searched, so many newest aerial surfaces are laid over the ground map as
-    one."""
+    """So many newest aerial surfaces are laid over the ground map as one: for the reported pose,
+    and if the heading is searched for all of localization."""
     estimate: Literal["mean", "mode"] = "mode"
     """Reported pose: mean of all particles; or of those around the densest place, moved to the
     nearby position and heading, known or searched, where the heights fit best."""
-    redrawn_fraction: Fraction = 0.1
+    redrawn_fraction: Fraction = 0.5
     """Share of the particles that each update draws from the current cost map."""
     min_mode_share: Fraction = 0.6
     """With `mode`: least share of the particles around the reported position."""
@@ -221,10 +223,14 @@ class Localization(Section):
     """Least standard deviation of the heights over the overlap for a claim [m]."""
     min_correlation: Fraction = 0.4
     """Least correlation of the heights at the estimate for a claim."""
-    min_evidence: Annotated[float, Field(ge=0)] = 16.0
-    """With `likelihood`: least logarithm of the likelihood ratio at the estimate for a claim [nat].
-    Some 10 000 places and headings differ by a patch or more, so one of them reaches ln 10 000 = 9
-    by chance; 7 more make that a matter of one in a thousand."""
+    min_evidence: Annotated[float, Field(ge=0)] = 12.0
+    """With `likelihood` and `channels`: least logarithm of the likelihood ratio at the estimate for
+    a claim [nat], against independent heights as they are in the overlap. Some 10 000 places and
+    headings differ by 0.3 m or more, so one of them reaches ln 10 000 = 9 by chance. `min_lead`
+    asks more where others reach more."""
+    min_lead: Annotated[float, Field(ge=0)] = 6.0
+    """With `likelihood` and `channels`: how much likelier the estimate must be than any place that
+    is 0.5 m or 15 deg off, for a claim [nat]."""
     min_agreement: Fraction = 0.2
     """Least agreement of the heights beyond chance for a claim (Cohen's kappa,
     core/agreement.py), also of the newest aerial map's alone where several are laid as one."""
@@ -233,9 +239,14 @@ class Localization(Section):
     to another place, for a claim."""
 
     @property
+    def in_nat(self) -> bool:
+        """Whether costs are logarithms of likelihood ratios."""
+        return self.cost in ("likelihood", "channels")
+
+    @property
     def maps_together(self) -> int:
-        """Number of newest aerial surfaces that are laid over the ground map as one: with a known
-        heading one, since the particles alone join them well."""
+        """Number of newest aerial surfaces that particles see as one: with a known heading one,
+        since the particles alone join them well."""
         return self.joint_maps if self.heading == "search" else 1
 
 
@@ -321,6 +332,7 @@ def _as_published(preset: PresetName, sigma: float) -> Config:
         localization=Localization(
             cost="zmssd",
             sigma=sigma,
+            search_radius_m=3.0,
             min_overlap=0.5,
             joint_maps=1,
             estimate="mean",

@@ -44,7 +44,8 @@ class CostMap:
         origin: (2,) float64 [m], the u of cell [0, 0] in the frame `ground`.
         cells_per_m: Resolution.
         heading: Turn of `mav` in `ground` [rad]; if searched, that of the lowest cost.
-        cost: Kind of cost: "zmssd" [m^2], "ncc" [1 - correlation] or "likelihood" [nat].
+        cost: Kind of cost: "zmssd" [m^2], "ncc" [1 - correlation], "likelihood" or "channels"
+            [nat].
     """
 
     costs: F32

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,17 +23,22 @@ class Fit:
         agreed: Agreement of the heights there, and beside it.
         newest_overlap: Share of the newest surface alone that lies over the ground map there.
         newest_agreed: Agreement of its heights.
+        evidence: How much likelier the heights are than independent ones, as a logarithm [nat]:
+            minus the cost, where costs are such; else infinite.
+        lead: How much likelier this place is than any other, likewise.
     """
 
     overlay: Overlays
     agreed: Agreement
     newest_overlap: float
     newest_agreed: Agreement
+    evidence: float = math.inf
+    lead: float = math.inf
 
 
 def why_refused(fit: Fit, particles: F64, config: Localization) -> str:
     """The reason, in one line, why no position is claimed; empty if one is.
-    Its kind comes first: no overlap, no structure, particles split or heights disagree.
+    Its kind comes first: no overlap, no structure, particles split, heights disagree or ambiguous.
 
     The covariance says whether particles agree with each other, not whether they are right: the
     rest asks whether the maps fit at the estimate, better than beside it.
@@ -60,11 +66,10 @@ def why_refused(fit: Fit, particles: F64, config: Localization) -> str:
     correlation = float(overlay.correlations()[0])
     if correlation < config.min_correlation:
         return f"heights disagree: at the estimate they correlate by {correlation:.2f} only"
-    evidence = -float(overlay.costs(config)[0])
-    if config.cost == "likelihood" and evidence < config.min_evidence:
+    if fit.evidence < config.min_evidence:
         return (
-            f"heights disagree: that they correlate by {correlation:.2f} over {overlap:.0%} of the "
-            f"aerial map may be chance ({evidence:.0f} nat, {config.min_evidence:g} are enough)"
+            f"heights disagree: that they fit over {overlap:.0%} of the aerial map may be chance "
+            f"({fit.evidence:.0f} nat, {config.min_evidence:g} are enough)"
         )
     # Several surfaces as one can agree by chance while the newest lies among other boxes.
     for those, agreed in (("they", fit.agreed), ("the newest", fit.newest_agreed)):
@@ -73,6 +78,11 @@ def why_refused(fit: Fit, particles: F64, config: Localization) -> str:
                 f"heights disagree: {those} agree over {agreed.share:.0%} at the estimate, "
                 f"and over {agreed.chance:.0%} beside it, which may be chance"
             )
+    if fit.lead < config.min_lead:
+        return (
+            f"ambiguous: another place fits nearly as well ({fit.lead:.1f} nat between them, "
+            f"{config.min_lead:g} are needed)"
+        )
     return ""
 
 

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy import fft
 
 from airground.config import Localization
 from airground.core.arrays import C64, F32, F64, I64, Floats
-from airground.core.belief import CostMap, HeightMap
+from airground.core.belief import HeightMap
 from airground.core.height_map import lattice_index
 from airground.localization.cost_kernels import (
     COUNT,
@@ -29,6 +28,7 @@ from airground.localization.cost_kernels import (
     zmssd,
     zmssd_of_differences,
 )
+from airground.localization.offset_grid import OffsetGrid
 from airground.localization.turned_kernels import MARGIN, filled_cells, in_fours, sums_at_poses
 
 
@@ -49,7 +49,8 @@ def masked(heights: F32, margin: int = 0, after: int = 0) -> Masked:
 
 
 def costs_of(sums: Floats, aerial_cells: int, cells_per_m: float, config: Localization) -> F32:
-    """(N,) costs of the configured kind for sums (N, 6) as in `cost_kernels`."""
+    """(N,) costs of the configured kind for sums (N, 6) as in `cost_kernels`.
+    ValueError for `channels`, which has other sums."""
     min_count = least_count(aerial_cells, config)
     match config.cost:
         case "zmssd":
@@ -59,9 +60,11 @@ def costs_of(sums: Floats, aerial_cells: int, cells_per_m: float, config: Locali
         case "likelihood":
             cells_of_patch = (config.patch_m * cells_per_m) ** 2
             return log_likelihood_ratio(sums, min_count, config.min_relief_m, cells_of_patch)
+        case "channels":
+            raise ValueError("the cost of channels is that of channels.py")
 
 
-class OffsetSearch:
+class OffsetSearch(OffsetGrid):
     """Costs of all whole-cell offsets at once, by correlations in the frequency domain.
 
     Every sum over the overlap is a correlation of masked maps, so six products of spectra
@@ -77,17 +80,8 @@ class OffsetSearch:
     def __init__(
         self, ground: HeightMap, centre: ArrayLike, radius_m: float, reach_cells: I64
     ) -> None:
-        scale = ground.cells_per_m
-        centre = np.asarray(centre, np.float64)
-        self.first = np.ceil((centre - radius_m) * scale - 1e-6).astype(np.int64)
-        self.shape = np.floor((centre + radius_m) * scale + 1e-6).astype(np.int64) - self.first + 1
-        self.cells_per_m = scale
-        self._reach = np.asarray(reach_cells, np.int64)
-        extent = self.shape + self._reach[1] - self._reach[0]
-        self._fft_shape = [fft.next_fast_len(int(n), real=True) for n in extent]
-        start = self.first + self._reach[0] - lattice_index(ground)
-        patch = masked(_window(ground.heights, start, extent))
-        self._spectra = self._transform(patch)
+        super().__init__(centre, radius_m, reach_cells, ground.cells_per_m)
+        self._spectra = self._transform(masked(self.under_offsets(ground)))
 
     def sums(self, aerial: HeightMap) -> F32:
         """(nx, ny, 6) sums over the overlap at every offset; heights are about the means."""
@@ -98,7 +92,7 @@ class OffsetSearch:
         product = np.empty_like(mask_g)
         for index, (aerial_spectrum, ground_spectrum) in enumerate(pairs):
             np.multiply(aerial_spectrum, ground_spectrum, out=product)
-            self._correlate(product, sums[..., index])
+            self.correlate(product, sums[..., index])
         np.rint(sums[..., COUNT], out=sums[..., COUNT])
         return sums
 
@@ -112,11 +106,11 @@ class OffsetSearch:
         sums = np.empty((*self.shape, 3), np.float32)
         product = np.empty_like(mask_g)
         np.multiply(mask_a, mask_g, out=product)
-        self._correlate(product, sums[..., 0])
+        self.correlate(product, sums[..., 0])
         difference_spectrum(mask_a, a, mask_g, g, product)
-        self._correlate(product, sums[..., 1])
+        self.correlate(product, sums[..., 1])
         squares_spectrum(mask_a, a, aa, mask_g, g, gg, product)
-        self._correlate(product, sums[..., 2])
+        self.correlate(product, sums[..., 2])
         np.rint(sums[..., COUNT], out=sums[..., COUNT])
         return sums
 
@@ -132,52 +126,13 @@ class OffsetSearch:
 
     def _aerial_spectra(self, aerial: HeightMap) -> tuple[C64, C64, C64]:
         """Conjugate spectra of the mask, the heights and their squares of an aerial map."""
-        offset = lattice_index(aerial) - self._reach[0]
-        inside = (offset >= 0).all() and (
-            offset + aerial.heights.shape <= self._reach[1] - self._reach[0] + 1
-        ).all()
-        if not inside:
-            raise ValueError("the aerial map is larger than the given reach")
-        canvas = np.full(tuple(self._reach[1] - self._reach[0] + 1), np.nan, np.float32)
-        nx, ny = aerial.heights.shape
-        canvas[offset[0] : offset[0] + nx, offset[1] : offset[1] + ny] = aerial.heights
-        mask_a, a, aa = (np.conj(s, out=s) for s in self._transform(masked(canvas)))
+        spectra = self._transform(masked(self.within_reach(aerial)))
+        mask_a, a, aa = (np.conj(s, out=s) for s in spectra)
         return mask_a, a, aa
 
     def _transform(self, patch: Masked) -> tuple[C64, C64, C64]:
-        spectrum = self._spectrum
+        spectrum = self.spectrum
         return spectrum(patch.mask), spectrum(patch.heights), spectrum(patch.heights**2)
-
-    def _spectrum(self, image: F32) -> C64:
-        """`rfft2` of the image with zeros around, not spent on the rows that are all zeros."""
-        rows, columns = self._fft_shape
-        result: C64 = fft.fft(fft.rfft(image, columns, axis=1), rows, axis=0, overwrite_x=True)
-        return result
-
-    def _correlate(self, product: C64, out: F32) -> None:
-        """`irfft2` of a product of spectra, for the rows of offsets only.
-        The product is overwritten: fresh memory costs as much time as the multiplication."""
-        rows, columns = self._fft_shape
-        spectra = fft.ifft(product, axis=0, norm="forward", overwrite_x=True)
-        lines = fft.irfft(spectra[: len(out)], columns, axis=1, norm="forward", overwrite_x=True)
-        np.multiply(lines[:, : out.shape[1]], np.float32(1 / (rows * columns)), out=out)
-
-
-def compute_cost_map(
-    aerial: HeightMap, ground: HeightMap, centre: ArrayLike, heading: float, config: Localization
-) -> CostMap:
-    """Cost of every position u of the MAV within the search region (Eq. 2, Fig. 7c).
-
-    Args:
-        aerial: Height map around the MAV's camera (see `aerial_height_map`).
-        ground: Height map in the frame `ground`, of the same resolution.
-        centre: (2,) the ground robot's position in `ground` [m].
-        heading: Turn of the aerial map [rad]; recorded only.
-        config: Section `localization` of the configuration.
-    """
-    search = OffsetSearch(ground, centre, config.search_radius_m, reach_of(aerial))
-    origin, costs = search.first / search.cells_per_m, search.costs(aerial, config)
-    return CostMap(costs, origin, search.cells_per_m, heading, config.cost)
 
 
 def reach_of(aerial: HeightMap) -> I64:
@@ -277,14 +232,3 @@ def _within_reach(ground: HeightMap, places: F64, reach_cells: I64) -> tuple[F32
     low = np.clip(low, 0, ground.heights.shape)
     high = np.clip(high, low, ground.heights.shape)
     return ground.heights[low[0] : high[0], low[1] : high[1]].copy(), edge + low
-
-
-def _window(heights: F32, start: I64, extent: I64) -> F32:
-    """The cells from `start` over `extent`, NaN outside the map."""
-    window = np.full(tuple(extent), np.nan, np.float32)
-    low = np.maximum(start, 0)
-    high = np.minimum(start + extent, heights.shape)
-    if (low < high).all():
-        inside = tuple(slice(*pair) for pair in zip(low - start, high - start, strict=True))
-        window[inside] = heights[low[0] : high[0], low[1] : high[1]]
-    return window

@@ -13,6 +13,7 @@ from airground.core.arrays import F32, F64
 from airground.core.belief import HeightMap
 from airground.core.height_map import make_height_map
 from airground.errors import InputError
+from airground.localization.channels import ChannelOverlay
 from airground.localization.cost_map import Overlays, overlay_at, overlay_turned, reach_of
 from airground.localization.hypotheses import CostVolume, search_headings, search_positions
 from airground.localization.nearby_minimum import lowest_nearby
@@ -112,6 +113,28 @@ class HeightMapPair:
             return overlay_turned(self.aerial, self.ground, particles)
         return overlay_at(self.aerial, self.ground, particles[:, :2])
 
+    def costs(self, particles: F64) -> F32:
+        """(M,) costs at each of (M, 3) x, y [m] and heading [rad]; NaN where little overlaps."""
+        local = self.config.localization
+        if local.cost == "channels":
+            return self.costs_as_posed(particles)
+        return self.overlay(particles).costs(local)
+
+    def costs_as_posed(self, poses: F64) -> F32:
+        """The same of poses whose heading need not be the known one."""
+        return self._costs_turned(poses - self._turned)
+
+    def _costs_turned(self, poses: F64) -> F32:
+        """(M,) costs of the aerial height map turned by poses (M, 3) further."""
+        local = self.config.localization
+        if local.cost == "channels":
+            return self._channels.costs(poses, local)
+        return overlay_turned(self.aerial, self.ground, poses).costs(local)
+
+    @cached_property
+    def _channels(self) -> ChannelOverlay:
+        return ChannelOverlay.of(self.aerial, self.ground)
+
     def overlay_as_posed(self, pose: F64) -> Overlays:
         """The aerial heights laid on the ground's at x, y [m] and heading [rad], which need not be
         the known one."""
@@ -121,7 +144,8 @@ class HeightMapPair:
         """The pose (3,) around an estimate at which the heights fit best. A known heading is turned
         too: magnetometers are off by a degree or two."""
         relative = estimate - self._turned
-        found = lowest_nearby(self.aerial, self.ground, relative, self.config.localization)
+        sigma = self.config.localization.sigma
+        found = lowest_nearby(self.aerial, self.ground, relative, self._costs_turned, sigma)
         return found + self._turned
 
     @property

@@ -10,14 +10,17 @@ from numba import get_num_threads
 from numpy.typing import ArrayLike
 
 from airground.config import Localization
-from airground.core.arrays import F32, F64
+from airground.core.arrays import F32, F64, I64
 from airground.core.belief import CostMap, HeightMap
 from airground.core.height_map import lattice_index, make_height_map
+from airground.localization.channels import ChannelSearch, every, floor_of, stride_of
 from airground.localization.cost_map import OffsetSearch, reach_of
 from airground.localization.particles import draw_cells
 
 COARSE_STEP_DEG = 4.0
 REFINED_MODES = 12
+NEAR_M, NEAR_DEG = 0.5, 15.0
+"""Reach of one place in a volume of costs [m], [deg]: beyond, another place fits."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +52,19 @@ class CostVolume:
         heading = float(self.headings[best])
         return CostMap(self.costs[best], self.origin, self.cells_per_m, heading, cost)
 
+    def lead(self, pose: F64) -> float:
+        """Lowest cost elsewhere minus the lowest near a pose (3,), x, y [m] and heading [rad].
+        Places without a cost count as 0, which is chance where costs are logarithms."""
+        costs = np.nan_to_num(self.costs)
+        x, y = (
+            self.origin[axis] + np.arange(costs.shape[1 + axis]) / self.cells_per_m - pose[axis]
+            for axis in (0, 1)
+        )
+        off = np.angle(np.exp(1j * (self.headings - pose[2])))
+        near = np.abs(off)[:, None, None] <= np.deg2rad(NEAR_DEG)
+        near = near & (np.hypot(x[:, None], y) <= NEAR_M)
+        return float(costs.min(where=~near, initial=0.0) - costs.min(where=near, initial=0.0))
+
     def draw(self, count: int, sigma: float, rng: np.random.Generator) -> F64:
         """(count, 3) hypotheses by Eq. 5, spread evenly within their cells; uniform if none fit."""
         costs = self.costs if self.feasible else np.zeros_like(self.costs)
@@ -61,7 +77,7 @@ def search_positions(
     aerial: HeightMap, ground: HeightMap, centre: ArrayLike, heading: float, config: Localization
 ) -> CostVolume:
     """Every position within the search region for a known heading (Eq. 2)."""
-    search = OffsetSearch(ground, centre, config.search_radius_m, reach_of(aerial))
+    search = _search(aerial, ground, centre, reach_of(aerial), config)
     costs = search.costs(aerial, config)[None]
     return CostVolume(
         np.array([heading]), costs, search.first / search.cells_per_m, search.cells_per_m
@@ -80,7 +96,7 @@ def search_headings(
         int(np.ceil(np.linalg.norm(cells[:, :2], axis=1).max(initial=0) * aerial.cells_per_m)) + 1
     )
     reach_cells = np.array([[-reach, -reach], [reach, reach]])
-    search = OffsetSearch(ground, centre, config.search_radius_m, reach_cells)
+    search = _search(aerial, ground, centre, reach_cells, config)
     step = max(1, int(COARSE_STEP_DEG / 360.0 * config.headings))
 
     def costs_of(turn: int) -> F32:
@@ -100,6 +116,16 @@ def search_headings(
     return CostVolume(headings, costs, search.first / search.cells_per_m, search.cells_per_m)
 
 
+def _search(
+    aerial: HeightMap, ground: HeightMap, centre: ArrayLike, reach_cells: I64, config: Localization
+) -> OffsetSearch | ChannelSearch:
+    """The search of the configured cost."""
+    if config.cost != "channels":
+        return OffsetSearch(ground, centre, config.search_radius_m, reach_cells)
+    floor = floor_of(every(aerial, stride_of(aerial.cells_per_m)))
+    return ChannelSearch(ground, floor, centre, config.search_radius_m, reach_cells)
+
+
 def _cells(aerial: HeightMap) -> F32:
     """(K, 3) centres and heights of the filled cells."""
     ix, iy = np.nonzero(np.isfinite(aerial.heights))
@@ -108,7 +134,11 @@ def _cells(aerial: HeightMap) -> F32:
 
 
 def _costs_turned(
-    search: OffsetSearch, cells: F32, turn: int, cells_per_m: float, config: Localization
+    search: OffsetSearch | ChannelSearch,
+    cells: F32,
+    turn: int,
+    cells_per_m: float,
+    config: Localization,
 ) -> F32:
     angle = 2 * np.pi * turn / config.headings
     c, s = np.float32(np.cos(angle)), np.float32(np.sin(angle))

@@ -13,11 +13,9 @@ from itertools import product
 import numpy as np
 from numba import njit
 
-from airground.config import Localization
 from airground.core.arrays import F32, F64
 from airground.core.belief import HeightMap
 from airground.core.height_map import lattice_index
-from airground.localization.cost_map import overlay_turned
 from airground.localization.particles import MODE_RADIUS_M
 from airground.localization.turned_kernels import filled_cells
 
@@ -28,29 +26,39 @@ MAX_TURN_DEG = 10.0
 MAX_MOVES = 8
 """Largest number of moves with one step: more than reach the bounds."""
 NEIGHBOURS = np.array(list(product((-1, 0, 1), repeat=3)), np.float64)
+MOST_LOST = 6.0
+"""Most cost that the second search may lose against the first, in sigma of Eq. 5: the area that
+agrees changes by as much with a centimetre. Another place loses more."""
 TRUNCATION_M = 0.1
 """Height difference from which on a cell counts as one that cannot fit [m]: several standard
 deviations of both maps' heights, and less than most boxes are high. Chosen on two flights."""
 
 
-def lowest_nearby(aerial: HeightMap, ground: HeightMap, estimate: F64, config: Localization) -> F64:
+def lowest_nearby(
+    aerial: HeightMap,
+    ground: HeightMap,
+    estimate: F64,
+    costs_at: Callable[[F64], F32],
+    sigma: float,
+) -> F64:
     """The pose (3,) around an estimate at which an aerial map fits best.
 
     Args:
         aerial: Heights around the MAV's camera, for heading 0.
         ground: Heights in the frame `ground`.
         estimate: x, y [m] of the camera and heading [rad], from that of `aerial`.
-        config: Section `localization`.
+        costs_at: (M,) costs of poses (M, 3) as `estimate`; NaN where too little overlaps.
+        sigma: Of Eq. 5, in the cost's units.
 
     Returns:
         A minimum within `MODE_RADIUS_M` and `MAX_TURN_DEG`; the estimate where too little overlaps.
-        The second search counts only where it costs less than sigma.
+        The second search counts only where it costs less than `MOST_LOST`.
     """
     cells, first = filled_cells(aerial.heights, *lattice_index(aerial))[0], lattice_index(ground)
     in_cells = np.array([ground.cells_per_m, ground.cells_per_m, 1.0])
 
     def costs(poses: F64, _: F64) -> F64:
-        return overlay_turned(aerial, ground, poses).costs(config).astype(np.float64)
+        return costs_at(poses).astype(np.float64)
 
     def truncated(poses: F64, best: F64) -> F64:
         where = ground.heights, first.astype(np.float64)
@@ -63,7 +71,7 @@ def lowest_nearby(aerial: HeightMap, ground: HeightMap, estimate: F64, config: L
     found = _descend(guess, estimate, truncated)
     # Floor on floor has small differences everywhere: the structure must fit as before.
     before, after = costs(np.array([guess, found]), guess)
-    return found if after <= before + config.sigma else guess
+    return found if after <= before + MOST_LOST * sigma else guess
 
 
 def _descend(start: F64, centre: F64, costs_of: Callable[[F64, F64], F64]) -> F64:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -36,7 +37,7 @@ class MonteCarloLocalizer:
         self._rng = rng
         self._particles: F64 | None = None
         self._position_mav = np.zeros(3)
-        self._newest: deque[HeightMapPair] = deque(maxlen=self._local.maps_together)
+        self._newest: deque[HeightMapPair] = deque(maxlen=self._local.joint_maps)
         self.belief: Belief | None = None
 
     def update(self, pair: HeightMapPair) -> Iterator[Event]:
@@ -49,7 +50,9 @@ class MonteCarloLocalizer:
             InputError: The heading is needed and unknown, or the resolutions differ.
         """
         self._newest.append(pair)
-        pair = pair.joined(tuple(self._newest)[:-1])
+        surfaces = tuple(self._newest)
+        together = pair.joined(surfaces[:-1])
+        pair = pair.joined(surfaces[-self._local.maps_together : -1])
         position_mav = np.array(pair.position_mav, np.float64)
         yield HeightMapsMade(pair.stamp_ns, pair.aerial, pair.ground)
 
@@ -65,13 +68,14 @@ class MonteCarloLocalizer:
             particles = volume.draw(self._local.particles, sigma, self._rng)
         else:
             moved = self._move(self._particles, position_mav - self._position_mav, pair)
-            costs = pair.overlay(moved).costs(self._local)
+            moved = self._redraw(moved, volume)
+            costs = pair.costs(moved)
             particles = moved[resample(weights(costs, self._sigma_of(costs)), self._rng)]
 
-        self.belief = self._summarize(pair, particles)
+        self.belief = self._summarize(pair, together, particles)
         if volume is None or volume.feasible or self._particles is not None:
             # Else nothing overlapped yet, and the next surface is the first one again.
-            self._particles = self._redraw(particles, volume)
+            self._particles = particles
         self._position_mav = position_mav
         yield BeliefUpdated(pair.stamp_ns, self.belief)
 
@@ -96,7 +100,7 @@ class MonteCarloLocalizer:
 
     def _redraw(self, particles: F64, volume: CostVolume | None) -> F64:
         """Replace a share of the particles by draws from the current cost map.
-        They join after the belief was summarized: the next aerial map judges them first."""
+        Costs weigh them together with those that were there before."""
         count = round(self._local.redrawn_fraction * len(particles))
         if volume is None or not volume.feasible or count == 0:
             return particles
@@ -104,7 +108,9 @@ class MonteCarloLocalizer:
         kept = self._rng.permutation(len(particles))[count:]
         return np.concatenate([particles[kept], drawn])
 
-    def _summarize(self, pair: HeightMapPair, particles: F64) -> Belief:
+    def _summarize(self, pair: HeightMapPair, together: HeightMapPair, particles: F64) -> Belief:
+        """What the particles say of one map. The reported pose is that where all of the newest
+        surfaces fit best `together`."""
         counted = particles
         if self._local.estimate == "mode":
             counted = particles[densest_mode(particles)]
@@ -113,15 +119,17 @@ class MonteCarloLocalizer:
         # Judged where the particles are: no search for a better fit has favoured that place.
         refusal = self._why_refused(pair, particles, estimate, overlay)
         if self._local.estimate == "mode":
-            estimate = pair.lowest_nearby(estimate)
+            estimate = together.lowest_nearby(estimate)
             overlay = pair.overlay_as_posed(estimate)
-        offset = float(overlay.height_offsets()[0])
+            offset = float(together.overlay_as_posed(estimate).height_offsets()[0])
+        else:
+            offset = float(overlay.height_offsets()[0])
         return Belief(
             stamp_ns=pair.stamp_ns,
             particles=particles,
             estimate=estimate,
             covariance=np.cov(particles[:, :2].T) + pair.pose_errors.covariance(estimate[2]),
-            cost=float(overlay.costs(self._local)[0]),
+            cost=float(pair.costs_as_posed(estimate[None])[0]),
             height_offset=offset,
             T_ground_mav=motion_at(estimate, pair.position_mav, offset),
             converged=not refusal,
@@ -141,6 +149,9 @@ class MonteCarloLocalizer:
             newest = make_height_map(T_ground_mav @ pair.newest.points_mav, cells_per_m)
             newest_agreed = agreement(newest, pair.ground)
         fit = Fit(overlay, agreed, pair.newest_overlap(estimate), newest_agreed)
+        if self._local.in_nat:
+            evidence = -float(pair.costs(estimate[None])[0])
+            fit = replace(fit, evidence=evidence, lead=pair.volume.lead(estimate))
         refusal = why_refused(fit, particles, self._local)
         return refusal or why_ambiguous(pair.aerial, laid, pair.ground, self._local)
 

@@ -16,13 +16,18 @@ from airground.core.height_map import lattice_index
 from airground.localization.cost_kernels import one_minus_correlation
 from airground.localization.cost_map import OffsetSearch, reach_of
 
+LONGEST_SHIFT_M = 3.0
+"""Longest shift that is looked at, along x and along y [m]. Rows of boxes repeat after less; maps
+shifted further share so few cells that some shift fits by chance."""
+
 
 def repetition(patch: HeightMap, within: HeightMap, cells: int, config: Localization) -> float:
     """Distance by which a map can be shifted to fit another again [m]; infinite without any.
 
     Shifts with a share `min_overlap` of so many cells and a correlation of `max_self_similarity`
     count, apart from those around 0: maps of wide shapes fit themselves there."""
-    search = OffsetSearch(within, (0.0, 0.0), config.search_radius_m, reach_of(patch))
+    radius_m = min(LONGEST_SHIFT_M, config.search_radius_m)
+    search = OffsetSearch(within, (0.0, 0.0), radius_m, reach_of(patch))
     sums = search.sums(patch).reshape(-1, 6)
     costs = one_minus_correlation(sums, config.min_overlap * cells, config.min_relief_m)
     alike, _ = ndimage.label(1 - costs.reshape(search.shape) > config.max_self_similarity)

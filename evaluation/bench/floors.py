@@ -92,7 +92,7 @@ def ray_cast(voxels: int, pixels: int) -> Floor:
     return Floor(FLOAT * voxels + (FLOAT + POINT) * pixels, 2 * voxels + 40 * pixels)
 
 
-def transforms(cells: int, count: int) -> Floor:
+def transforms(cells: float, count: int) -> Floor:
     """Real Fourier transforms of maps that stay in the cache: 2.5 n log2 n each."""
     return Floor(0, 2.5 * cells * math.log2(cells) * count)
 
@@ -103,6 +103,14 @@ def cost_map(cells: int) -> Floor:
     differences; six complex products. `cells` are those of the searched square, widened by the
     aerial map."""
     return transforms(cells, 9) + Floor(0, 6 * 6 * cells / 2)
+
+
+def cost_map_channels(cells: float, channels: int, shifts: int) -> Floor:
+    """The agreement of two maps in channels at all offsets, with shifts of their heights.
+    Each channel of both maps is transformed; the share of each channel of both in the overlap and
+    for each shift the agreement back. A shift takes a complex product and a sum per channel."""
+    count = 4 * channels + shifts
+    return transforms(cells, count) + Floor(0, 8 * channels * shifts * cells / 2)
 
 
 def heading_search(cells: int, headings: int) -> Floor:

@@ -12,6 +12,8 @@ from airground.augmentation import Augmentation
 from airground.config import Config, paper
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
+from airground.localization.channel_kernels import CHANNELS, SHIFTS
+from airground.localization.channels import ChannelOverlay, stride_of
 from airground.localization.cost_map import reach_of
 from airground.localization.height_map_pair import HeightMapPair
 from airground.localization.hypotheses import CostVolume, search_headings, search_positions
@@ -61,6 +63,11 @@ class Maps:
         side = 2 * self.config.localization.search_radius_m * self.aerial.cells_per_m
         return math.floor(side + 1e-6) + 1
 
+    @property
+    def looked_at(self) -> int:
+        """One in so many cells along x and along y, by the cost of channels."""
+        return stride_of(self.aerial.cells_per_m)
+
     def searched_cells(self, reach: tuple[int, ...]) -> int:
         """Cells of the searched square, widened by an aerial map of this shape."""
         return math.prod(self._offsets + n - 1 for n in reach)
@@ -90,6 +97,12 @@ def paper_sized(**localization: object) -> Config:
     return with_localization(paper(), **{"search_radius_m": radius_m, **localization})
 
 
+def best_sized(material: Material, **localization: object) -> Config:
+    """The constants of `best`, with that area."""
+    radius_m = math.sqrt(math.prod(PAPER_SEARCH_M)) / 2
+    return with_localization(material.config, **{"search_radius_m": radius_m, **localization})
+
+
 def height_maps(material: Material) -> Work:
     """Both maps, as `best` makes them for each surface."""
     maps = Maps(material, material.config)
@@ -110,6 +123,35 @@ def cost_map_correlation(material: Material) -> Work:
 def _cost_map(maps: Maps, cost: str) -> Work:
     floor = floors.cost_map(maps.searched_cells(maps.aerial.heights.shape))
     return Work(maps.search, size=f"{maps.size}, {cost}", floor=floor)
+
+
+def cost_map_channels(material: Material) -> Work:
+    """The cost of `best`, at its resolution, over the area that the paper timed."""
+    maps = Maps(material, best_sized(material))
+    cells = maps.searched_cells(maps.aerial.heights.shape) / maps.looked_at**2
+    floor = floors.cost_map_channels(cells, CHANNELS, len(SHIFTS))
+    return Work(maps.search, size=f"{maps.size}, channels", floor=floor)
+
+
+def heading_search_channels(material: Material) -> Work:
+    maps = Maps(material, best_sized(material, heading="search"))
+    searched = len(maps.search().headings)
+    size = f"{maps.config.localization.headings} headings ({searched} looked at), {maps.size}"
+    return Work(maps.search, size=f"{size}, channels")
+
+
+def particles_channels(material: Material) -> Work:
+    """Weigh and draw the particles of `best`, each with a heading."""
+    maps = Maps(material, best_sized(material, heading="search"))
+    config, rng = maps.config.localization, np.random.default_rng(0)
+    poses = maps.poses(config.particles)
+
+    def update() -> object:
+        costs = ChannelOverlay.of(maps.aerial, maps.ground).costs(poses, config)
+        return poses[resample(weights(costs, config.sigma), rng)]
+
+    cells = maps.aerial.filled_cells // maps.looked_at**2
+    return Work(update, size=f"{len(poses)} particles, {cells} filled cells that are looked at")
 
 
 def heading_search(material: Material) -> Work:

@@ -68,13 +68,25 @@ ROWS = (
         6,
     ),
     Row(
+        _ours("cost_map_channels", "Full cost map, by channels", GLOBAL),
+        localization_rows.cost_map_channels,
+    ),
+    Row(
         _ours("headings", "Search over 360 headings", GLOBAL), localization_rows.heading_search, 450
+    ),
+    Row(
+        _ours("headings_channels", "Search over 360 headings, by channels", GLOBAL),
+        localization_rows.heading_search_channels,
     ),
     Row(STAGES["particles"], localization_rows.particles, 3),
     Row(
         _ours("particles_heading", "200 particles with heading", GLOBAL),
         localization_rows.particles_heading,
         3,
+    ),
+    Row(
+        _ours("particles_channels", "200 particles with heading, by channels", GLOBAL),
+        localization_rows.particles_channels,
     ),
     Row(STAGES["icp"], localization_rows.icp, 200),
     Row(_ours("refinement", "Local search and ICP", REFINEMENT), localization_rows.refinement),

@@ -7,18 +7,19 @@ from collections.abc import Collection
 from airground.config import Config
 
 SEARCHED = ("localization.heading", "search")
-LIKELIHOOD = ("localization.cost", "likelihood")
+IN_NAT = ("localization.cost", ("likelihood", "channels"))
 MODE = ("localization.estimate", "mode")
 BOTH_SIDES = ("view_selection.both_sides", True)
 SEMIGLOBAL = ("plane_sweep.smoothing", "semiglobal")
 LOCAL_SEARCH = ("refinement.local_search", True)
 
-SWITCH_OF: dict[str, tuple[str, str | bool]] = {
+SWITCH_OF: dict[str, tuple[str, str | bool | tuple[str, ...]]] = {
     "localization.headings": SEARCHED,
     "localization.heading_noise_deg": SEARCHED,
-    "localization.joint_maps": SEARCHED,
-    "localization.patch_m": LIKELIHOOD,
-    "localization.min_evidence": LIKELIHOOD,
+    "localization.joint_maps": MODE,
+    "localization.patch_m": IN_NAT,
+    "localization.min_evidence": IN_NAT,
+    "localization.min_lead": IN_NAT,
     "localization.min_mode_share": MODE,
     "plane_sweep.one_side_penalty": BOTH_SIDES,
     "plane_sweep.step_penalty": SEMIGLOBAL,
@@ -28,7 +29,7 @@ SWITCH_OF: dict[str, tuple[str, str | bool]] = {
     "refinement.local_search_angle_deg": LOCAL_SEARCH,
     "refinement.local_search_cells_per_m": LOCAL_SEARCH,
 }
-"""The parameter that switches another one on, and with which value."""
+"""The parameter that switches another one on, and with which value or values."""
 
 
 def switched_off(config: Config, name: str, varied: Collection[str] = ()) -> str:
@@ -40,7 +41,8 @@ def switched_off(config: Config, name: str, varied: Collection[str] = ()) -> str
         return ""
     switch, on = SWITCH_OF[name]
     section, _, key = switch.partition(".")
-    if getattr(getattr(config, section), key) == on:
+    value = getattr(getattr(config, section), key)
+    if value in on if isinstance(on, tuple) else value == on:
         return ""
     return f"{name} changes nothing without {condition_of(name)}"
 
@@ -48,4 +50,6 @@ def switched_off(config: Config, name: str, varied: Collection[str] = ()) -> str
 def condition_of(name: str) -> str:
     """What switches a parameter of `SWITCH_OF` on, as `--set` takes it."""
     switch, on = SWITCH_OF[name]
+    if isinstance(on, tuple):
+        return f"{switch}={' or '.join(on)}"
     return f"{switch}={str(on).lower() if isinstance(on, bool) else on}"

@@ -25,12 +25,14 @@ def changed(**changes: object) -> Localization:
     return BEST.model_copy(update=changes)
 
 
-def test_the_same_correlation_may_be_chance_over_a_small_overlap() -> None:
-    # A square metre holds 11 patches, each of which is worth half a nat.
-    small, large = fit(0.8, cells=625), fit(0.8, cells=4 * 625)
-    assert "may be chance (6 nat, 16 are enough)" in why_refused(small, TOGETHER, BEST)
-    assert why_refused(large, TOGETHER, BEST) == ""
-    assert why_refused(small, TOGETHER, changed(cost="ncc", sigma=0.05)) == ""
+def test_a_fit_may_be_chance_or_that_of_another_place() -> None:
+    weak, alike = replace(fit(0.8), evidence=6.4), replace(fit(0.8), evidence=40.0, lead=5.5)
+    assert "may be chance (6 nat, 12 are enough)" in why_refused(weak, TOGETHER, BEST)
+    assert why_refused(alike, TOGETHER, BEST) == (
+        "ambiguous: another place fits nearly as well (5.5 nat between them, 6 are needed)"
+    )
+    assert why_refused(replace(alike, lead=6.5), TOGETHER, BEST) == ""
+    assert why_refused(alike, TOGETHER, changed(min_lead=5.0)) == ""
 
 
 def test_a_single_particle_agrees_with_no_other() -> None:

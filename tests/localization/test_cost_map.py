@@ -11,12 +11,12 @@ from airground.core.belief import HeightMap
 from airground.core.height_map import lattice_index
 from airground.localization.cost_map import (
     OffsetSearch,
-    compute_cost_map,
     masked,
     overlay_at,
     overlay_turned,
     reach_of,
 )
+from airground.localization.hypotheses import search_positions
 from airground.localization.turned_kernels import MARGIN, filled_cells, in_fours
 from tests.localization import naive
 
@@ -36,6 +36,10 @@ def config(cost, **changes):
     return Localization(cost=cost, search_radius_m=1.0, **changes)
 
 
+def cost_map_of(aerial, ground, centre, heading, setting):
+    return search_positions(aerial, ground, centre, heading, setting).cost_map(setting.cost)
+
+
 @pytest.mark.parametrize("cost", ["zmssd", "ncc", "likelihood"])
 @pytest.mark.parametrize("seed", range(3))
 def test_all_offsets_equal_a_naive_double_loop(cost, seed):
@@ -43,7 +47,7 @@ def test_all_offsets_equal_a_naive_double_loop(cost, seed):
     aerial = random_map(rng, (14, 11), (-6, -4), level=2.0)
     ground = random_map(rng, (26, 30), (-12, -13))
     setting = config(cost)
-    found = compute_cost_map(aerial, ground, (0.6, -0.5), 0.3, setting)
+    found = cost_map_of(aerial, ground, (0.6, -0.5), 0.3, setting)
     assert found.costs.shape == (21, 21)
     assert found.heading == 0.3
     first = np.rint(found.origin * CELLS_PER_M).astype(int)
@@ -106,7 +110,7 @@ def test_a_particle_on_the_lattice_costs_what_the_map_says(cost, width):
     aerial = random_map(rng, (20, width), (-9, -width // 2 + 1))
     ground = random_map(rng, (40, width + 24), (-20, -width // 2 - 12))
     setting = config(cost)
-    whole = compute_cost_map(aerial, ground, (0.0, 0.0), 0.0, setting)
+    whole = cost_map_of(aerial, ground, (0.0, 0.0), 0.0, setting)
     cells = np.array(list(np.ndindex(*whole.costs.shape)))
     single = overlay_at(aerial, ground, whole.origin + cells / CELLS_PER_M).costs(setting)
     np.testing.assert_allclose(single, whole.costs.ravel(), rtol=1e-3, atol=1e-5)
@@ -119,7 +123,7 @@ def test_a_known_shift_and_height_are_recovered(cost, dx, dy, lift):
     ground = random_map(np.random.default_rng(7), (60, 60), (-30, -30), holes=0.1)
     piece = ground.heights[15:45, 15:45] + np.float32(lift)
     aerial = HeightMap(piece, np.array([-15 - dx, -15 - dy]) / CELLS_PER_M, CELLS_PER_M)
-    best = compute_cost_map(aerial, ground, (0.0, 0.0), 0.0, config(cost)).best()
+    best = cost_map_of(aerial, ground, (0.0, 0.0), 0.0, config(cost)).best()
     np.testing.assert_allclose(best, np.array([dx, dy]) / CELLS_PER_M, atol=1e-9)
     offset = overlay_at(aerial, ground, best[None]).height_offsets()[0]
     assert offset == pytest.approx(-lift, abs=1e-4)
@@ -159,7 +163,7 @@ def test_a_vertical_offset_leaves_eq_2_unchanged(lift):
     aerial, ground = random_map(rng, (20, 16), (-9, -7)), random_map(rng, (40, 40), (-20, -20))
     lifted = HeightMap(aerial.heights + np.float32(lift), aerial.origin, CELLS_PER_M)
     low, high = (
-        compute_cost_map(m, ground, (0, 0), 0.0, config("zmssd")).costs for m in (aerial, lifted)
+        cost_map_of(m, ground, (0, 0), 0.0, config("zmssd")).costs for m in (aerial, lifted)
     )
     np.testing.assert_allclose(low, high, rtol=1e-3, atol=1e-5)
 
@@ -171,8 +175,8 @@ def test_moving_ground_and_search_moves_the_costs(dx, dy):
     aerial, ground = random_map(rng, (20, 16), (-9, -7)), random_map(rng, (40, 40), (-20, -20))
     shift = np.array([dx, dy]) / CELLS_PER_M
     moved = HeightMap(ground.heights, ground.origin + shift, CELLS_PER_M)
-    here = compute_cost_map(aerial, ground, (0, 0), 0.0, config("ncc"))
-    there = compute_cost_map(aerial, moved, shift, 0.0, config("ncc"))
+    here = cost_map_of(aerial, ground, (0, 0), 0.0, config("ncc"))
+    there = cost_map_of(aerial, moved, shift, 0.0, config("ncc"))
     np.testing.assert_allclose(there.origin, here.origin + shift, atol=1e-9)
     np.testing.assert_array_equal(here.costs, there.costs)
 
@@ -181,8 +185,8 @@ def test_swapping_the_maps_mirrors_eq_2():
     rng = np.random.default_rng(10)
     a, g = random_map(rng, (20, 20), (-10, -10)), random_map(rng, (20, 20), (-10, -10))
     setting = config("zmssd", min_overlap=0.0)
-    one = compute_cost_map(a, g, (0, 0), 0.0, setting).costs
-    other = compute_cost_map(g, a, (0, 0), 0.0, setting).costs
+    one = cost_map_of(a, g, (0, 0), 0.0, setting).costs
+    other = cost_map_of(g, a, (0, 0), 0.0, setting).costs
     np.testing.assert_allclose(one, other[::-1, ::-1], rtol=1e-3, atol=1e-5)
 
 
@@ -201,7 +205,7 @@ def test_flat_ground_correlates_with_nothing():
     noise = rng.normal(0, 0.004, (40, 40)).astype(np.float32)
     ground = HeightMap(noise, np.array([-2.0, -2.0]), CELLS_PER_M)
     aerial = HeightMap(noise[10:30, 10:30], np.array([-1.0, -1.0]), CELLS_PER_M)
-    costs = compute_cost_map(aerial, ground, (0, 0), 0.0, config("ncc")).costs
+    costs = cost_map_of(aerial, ground, (0, 0), 0.0, config("ncc")).costs
     assert np.nanmin(costs) > 0.95
 
 

@@ -56,11 +56,10 @@ def test_a_pose_lies_the_same_whatever_heading_is_known(clouds):
     """Height maps that were turned by the known heading, and those that a pose turns."""
     pose = np.array([*POSITION[:2], 0.0])
     cost_of = [
-        paired(clouds, heading).overlay_as_posed(pose).costs(Config().localization)[0]
-        for heading in (0.0, 0.05, -0.1)
+        paired(clouds, heading).costs_as_posed(pose[None])[0] for heading in (0.0, 0.05, -0.1)
     ]
     off = pose + np.array([0.2, 0.2, 0.3])
-    away = paired(clouds).overlay_as_posed(off).costs(Config().localization)[0]
+    away = paired(clouds).costs_as_posed(off[None])[0]
     np.testing.assert_allclose(cost_of, cost_of[0], rtol=0.15)
     assert away > max(cost_of) + abs(cost_of[0]) / 2
     moved = [paired(clouds, heading).lowest_nearby(pose) for heading in (0.0, 0.05, -0.1)]

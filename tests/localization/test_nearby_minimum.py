@@ -6,6 +6,7 @@ import pytest
 from airground.config import Config
 from airground.core.belief import HeightMap
 from airground.core.height_map import make_height_map
+from airground.localization.channels import ChannelOverlay
 from airground.localization.height_map_pair import aerial_height_map
 from airground.localization.nearby_minimum import (
     TRUNCATION_M,
@@ -17,7 +18,7 @@ from tests.localization.synthetic import aerial_points, box_heap, ground_points
 
 PATH = [(-0.5, 0.2), (-0.1, 0.3), (0.3, 0.3)]
 CONFIG = Config()
-SEARCH = CONFIG.localization.model_copy(update={"heading": "search"})
+LOCAL = CONFIG.localization
 GUESS = np.array([0.12, -0.1, np.deg2rad(4.0)])
 
 
@@ -36,9 +37,15 @@ def errors(pose):
     return np.hypot(*(pose[:2] - PATH[-1])), abs(np.rad2deg(pose[2]))
 
 
+def moved(aerial, ground, start):
+    overlay = ChannelOverlay.of(aerial, ground)
+    costs_at = lambda poses: overlay.costs(poses, LOCAL)  # noqa: E731
+    return lowest_nearby(aerial, ground, start, costs_at, LOCAL.sigma)
+
+
 def test_a_guess_moves_to_the_truth(maps):
     start = np.array([*PATH[-1], 0.0]) + GUESS
-    metres, degrees = errors(lowest_nearby(*maps, start, SEARCH))
+    metres, degrees = errors(moved(*maps, start))
     assert metres < 0.03
     assert degrees < 1.0
 
@@ -50,21 +57,21 @@ def test_changed_boxes_do_not_pull_the_minimum(maps):
     heights[centre[0] - 8 : centre[0] + 8, centre[1] + 5 : centre[1] + 30] += 0.5
     ground = HeightMap(heights, seen.origin, seen.cells_per_m)
     start = np.array([*PATH[-1], 0.0]) + GUESS
-    metres, degrees = errors(lowest_nearby(aerial, ground, start, SEARCH))
+    metres, degrees = errors(moved(aerial, ground, start))
     assert metres < 0.03
     assert degrees < 1.0
 
 
 def test_the_result_stays_near_the_guess(maps):
     start = np.array([*PATH[-1], 0.0]) + np.array([0.5, 0.3, 0.4])
-    off = lowest_nearby(*maps, start, SEARCH) - start
+    off = moved(*maps, start) - start
     assert np.hypot(*off[:2]) <= 0.25 + 1e-9
     assert abs(off[2]) <= np.deg2rad(10.0) + 1e-9
 
 
 def test_without_overlap_the_guess_stays(maps):
     start = np.array([40.0, 0.0, 1.0])
-    np.testing.assert_array_equal(lowest_nearby(*maps, start, SEARCH), start)
+    np.testing.assert_array_equal(moved(*maps, start), start)
 
 
 @pytest.mark.kernel

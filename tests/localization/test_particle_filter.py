@@ -127,7 +127,9 @@ def test_flat_ground_claims_nothing_and_says_why(flat_flight, config):
         assert "no structure" in belief.refusal
 
 
-@pytest.mark.parametrize("cost_sigma", [("likelihood", 1.0), ("ncc", 0.05), ("zmssd", 0.001)])
+@pytest.mark.parametrize(
+    "cost_sigma", [("channels", 1.0), ("likelihood", 1.0), ("ncc", 0.05), ("zmssd", 0.001)]
+)
 def test_another_heaps_map_is_refused(lost_flight, cost_sigma):
     cost, sigma = cost_sigma
     config = changed(Config(), cost=cost, sigma=sigma)
@@ -205,11 +207,20 @@ def test_an_empty_surface_is_refused_not_an_error(flight, points, heading):
     assert last.belief.refusal
 
 
-def test_surfaces_are_joined_only_where_the_heading_is_searched(flight):
+def test_particles_of_a_known_heading_see_one_map_and_the_reported_pose_several(flight):
     with_joint, without = (
-        beliefs(flight.localize(changed(Config(), joint_maps=maps)))[-1] for maps in (4, 1)
+        beliefs(flight.localize(changed(Config(), joint_maps=maps))) for maps in (4, 1)
     )
-    np.testing.assert_array_equal(with_joint.estimate, without.estimate)
+    for joint, alone in zip(with_joint, without, strict=True):
+        np.testing.assert_array_equal(joint.particles, alone.particles)
+        assert joint.overlap == pytest.approx(alone.overlap, abs=0.05)
+    np.testing.assert_array_equal(with_joint[0].estimate, without[0].estimate)
+
+    def worst_deg(found):
+        return np.rad2deg(max(abs(belief.estimate[2] - HEADING) for belief in found[2:]))
+
+    assert not np.array_equal(with_joint[-1].estimate, without[-1].estimate)
+    assert worst_deg(with_joint) < 0.8
 
 
 def test_several_maps_together_sharpen_a_searched_heading(flight):

@@ -27,8 +27,8 @@ WIDER = 2.0
 """Search radius as a multiple of the pipeline's: enough to reach beyond the ground map."""
 HERE_M, ELSEWHERE_M = 0.25, 0.5
 """Radius within which a place counts as the true one, and beyond which as another [m]."""
-WORST = {"zmssd": 2.0, "ncc": 2.0, "likelihood": 0.0}
-"""Cost of heights that differ by 2 m RMS [m^2], with correlation -1, and without correlation."""
+WORST = {"zmssd": 2.0, "ncc": 2.0, "likelihood": 0.0, "channels": 0.0}
+"""Cost of heights that differ by 2 m RMS [m^2], with correlation -1, and that fit by chance."""
 
 
 def add_wide_searches(

@@ -25,7 +25,12 @@ from evaluation.show.figures.style import (
     value_range,
 )
 
-COST_UNITS = {"zmssd": "ZMSSD [m²]", "ncc": "1 - correlation", "likelihood": "ln likelihood ratio"}
+COST_UNITS = {
+    "zmssd": "ZMSSD [m²]",
+    "ncc": "1 - correlation",
+    "likelihood": "ln likelihood ratio",
+    "channels": "ln likelihood ratio",
+}
 
 
 @styled

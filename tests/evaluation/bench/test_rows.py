@@ -77,7 +77,7 @@ def test_two_rows_are_timed_on_both_lanes_with_their_peers(material: Material) -
     assert "points" in height_map.size
 
 
-LONG = ("headings",)
+LONG = ("headings", "headings_channels")
 
 
 @pytest.mark.parametrize(

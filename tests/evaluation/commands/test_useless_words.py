@@ -66,13 +66,15 @@ USELESS = {
         "--set localization.headings=90: localization.headings changes nothing without "
         "localization.heading=search"
     ),
-    "run R --preset paper --set localization.patch_m=0.2": "without localization.cost=likelihood",
+    "run R --preset paper --set localization.patch_m=0.2": (
+        "without localization.cost=likelihood or channels"
+    ),
     "live R --set refinement.local_search=false --set refinement.local_search_radius_m=1": (
         "changes nothing without refinement.local_search=true"
     ),
-    "reproduce --suite fast --set localization.joint_maps=2": "without localization.heading=search",
-    "reproduce --level easy --set localization.joint_maps=2": "without localization.heading=search",
-    "sweep --vary localization.joint_maps=1,4": "without localization.heading=search",
+    "reproduce --suite fast --set localization.headings=90": "without localization.heading=search",
+    "reproduce --level easy --set localization.headings=90": "without localization.heading=search",
+    "sweep --vary localization.headings=90,180": "without localization.heading=search",
     "run R --set plane_sweep.smoothing=none --set plane_sweep.step_penalty=1": (
         "changes nothing without plane_sweep.smoothing=semiglobal"
     ),
@@ -163,7 +165,8 @@ def test_every_switch_is_a_parameter_that_can_be_off() -> None:
         config = with_value(Config(), section, key, off, "test")
         assert switched_off(config, name).startswith(f"{name} changes nothing without {switch}=")
         assert switched_off(config, name, [switch]) == ""
-        assert switched_off(with_value(config, section, key, on, "test"), name) == ""
+        for value in on if isinstance(on, tuple) else (on,):
+            assert switched_off(with_value(config, section, key, value, "test"), name) == ""
 
 
 def test_the_sections_that_each_verb_uses() -> None:

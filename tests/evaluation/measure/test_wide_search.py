@@ -81,7 +81,7 @@ def test_the_region_reaches_twice_as_far(flown: Flown, monkeypatch: pytest.Monke
     monkeypatch.setattr(wide_search, "localize_sequence", listen)
     out = RowWriter("heap", flown.seed, 0, CONDITION)
     add_wide_searches(out, flown.sightings, flown.truth, Config(), (0, 0), 2)  # type: ignore[arg-type]
-    assert [config.localization.search_radius_m for config in asked] == [6.0, 6.0]
+    assert [config.localization.search_radius_m for config in asked] == [9.0, 9.0]
 
 
 def test_without_aerial_maps_there_are_no_rows(flown: Flown) -> None:

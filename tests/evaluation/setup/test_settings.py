@@ -58,7 +58,7 @@ def test_values_are_toml_and_words_need_no_quotes() -> None:
         ("localization.min_overlap=2", "localization.min_overlap = 2"),
         ("fusion.truncation_m=-1", "greater than 0"),
         ("fusion.voxels=[1, 2]", "fusion.voxels"),
-        ("localization.cost=ssd", "'zmssd', 'ncc' or 'likelihood'"),
+        ("localization.cost=ssd", "'zmssd', 'ncc', 'likelihood' or 'channels'"),
         ("preset.name=1", "unknown section 'preset'"),
     ],
 )
