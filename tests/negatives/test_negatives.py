@@ -46,10 +46,12 @@ def test_no_place_is_claimed_where_there_is_none_and_most_are_where_there_is(flo
 
 
 def test_rows_are_claimed_wrongly_without_the_limit_of_self_similarity(flown):
-    free = with_localization(Config(), max_self_similarity=1.0)
-    numbers = cases("rows, moved", 2)
+    free = with_localization(Config(), max_self_similarity=1.0, min_lead=0.0)
+    limited = with_localization(Config(), min_lead=0.0)
+    numbers = cases("rows, moved", 4)
     assert any(one.is_wrong for one in outcomes(0, numbers, flown, free))
-    assert not any(one.claimed for one in outcomes(0, numbers, flown, Config()))
+    for config in (limited, Config()):
+        assert not any(one.claimed for one in outcomes(0, numbers, flown, config))
 
 
 def test_the_picture_shows_both_maps_where_they_differ(flown, tmp_path):
