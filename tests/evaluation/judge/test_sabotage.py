@@ -19,7 +19,8 @@ from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
 from airground.core.sighting import Sighting
 from airground.core.surface import AerialSurface
-from airground.localization import cost_map, height_map_pair
+from airground.localization import channels, height_map_pair
+from airground.localization.channel_kernels import GROUND
 from airground.localization.particle_filter import MonteCarloLocalizer
 from evaluation.judge.accepted import Measured
 from evaluation.judge.verdict import Comparison, Verdict, compare
@@ -145,17 +146,19 @@ def shift_by_two_cells(patch: pytest.MonkeyPatch) -> None:
 
 def forget_the_overlap(patch: pytest.MonkeyPatch) -> None:
     """Neither its rule nor its weight: without the rule alone, small overlaps count little."""
-    original = cost_map.costs_of
+    original = channels.costs_of
 
     def costs_of(sums: Floats, _: int, cells_per_m: float, config: Localization) -> F32:
-        alike = config.model_copy(update={"cost": "ncc"})
-        return original(sums, 0, cells_per_m, alike)
+        overlap_m2 = np.maximum(sums[:, GROUND:].sum(axis=1), 1) / cells_per_m**2
+        return np.float32(1) * original(sums, 0, cells_per_m, config) / overlap_m2
 
-    patch.setattr(cost_map, "costs_of", costs_of)
+    patch.setattr(channels, "costs_of", costs_of)
 
 
 def freeze_the_particles(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(MonteCarloLocalizer, "_move", lambda _, particles, *rest: particles.copy())
+    """Neither moved nor drawn anew."""
+    for name in ("_move", "_redraw"):
+        patch.setattr(MonteCarloLocalizer, name, lambda _, particles, *rest: particles.copy())
 
 
 @pytest.mark.parametrize(
