@@ -26,8 +26,8 @@ from evaluation.bench.work import Work
 from evaluation.setup.published import START_NOISE_DEG, START_NOISE_M
 from evaluation.setup.setups import with_localization
 
-PAPER_SEARCH_M = (4.0, 5.0)
-"""The region that the paper timed; a square of the same area is timed here."""
+PAPER_RADIUS_M = math.sqrt(4.0 * 5.0) / 2
+"""Half the side of the square that is timed, of the area that the paper timed: 4 x 5 m."""
 CLOUD_OF_PARTICLES_M, CLOUD_OF_PARTICLES_RAD = 0.3, 0.1
 """Standard deviation of the particles about the right place and heading: a belief that has
 nearly converged."""
@@ -93,14 +93,12 @@ class Maps:
 
 def paper_sized(**localization: object) -> Config:
     """The published constants, with the searched area that the paper timed."""
-    radius_m = math.sqrt(math.prod(PAPER_SEARCH_M)) / 2
-    return with_localization(paper(), **{"search_radius_m": radius_m, **localization})
+    return with_localization(paper(), **{"search_radius_m": PAPER_RADIUS_M, **localization})
 
 
 def best_sized(material: Material, **localization: object) -> Config:
     """The constants of `best`, with that area."""
-    radius_m = math.sqrt(math.prod(PAPER_SEARCH_M)) / 2
-    return with_localization(material.config, **{"search_radius_m": radius_m, **localization})
+    return with_localization(material.config, **{"search_radius_m": PAPER_RADIUS_M, **localization})
 
 
 def height_maps(material: Material) -> Work:

@@ -150,7 +150,7 @@ def forget_the_overlap(patch: pytest.MonkeyPatch) -> None:
 
     def costs_of(sums: Floats, _: int, cells_per_m: float, config: Localization) -> F32:
         overlap_m2 = np.maximum(sums[:, GROUND:].sum(axis=1), 1) / cells_per_m**2
-        return np.float32(1) * original(sums, 0, cells_per_m, config) / overlap_m2
+        return (original(sums, 0, cells_per_m, config) / overlap_m2).astype(np.float32)
 
     patch.setattr(channels, "costs_of", costs_of)
 
