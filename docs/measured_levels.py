@@ -42,7 +42,6 @@ RUNS = Path(__file__).with_suffix("")
 """One folder a level, with one folder a run."""
 PICTURES = PAGE.parent / "pictures"
 """Where the pictures of several levels lie, each named after its figure."""
-LEVELS = ("paper", "easy", "medium", "hard", "extreme")
 STAGES = (
     *("localization", "baseline", "alignment", "refinement", "trajectory", "appearance"),
     *(case.stage for case in CASES),
@@ -78,10 +77,9 @@ def page(kept: Path = RUNS) -> str:
 
 
 def measured_levels(kept: Path = RUNS) -> list[AtLevel]:
-    """What the runs in `kept` measured, the easiest level first."""
+    """What the runs in `kept` measured, level by level."""
     runs = _runs(kept)
-    levels = merged([read_results(run) for run in runs]).levels if runs else ()
-    return sorted(levels, key=lambda one: (LEVELS.index(one.level.name), one.level.version))
+    return list(merged([read_results(run) for run in runs]).levels) if runs else []
 
 
 def _runs(kept: Path) -> list[Path]:

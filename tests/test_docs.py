@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 import pytest
+from matplotlib.testing.compare import compare_images
 from pydantic import BaseModel
 
 from airground.config import Config
@@ -20,6 +21,8 @@ from evaluation.datasets.formats import FORMATS
 from evaluation.judge.results import CONFIG, SHOWCASE, SUMMARY, TABLE
 from evaluation.judge.summary import Summary
 from evaluation.measure.plans.dials import DIALS
+from evaluation.show.figures.style import write_png
+from evaluation.show.report.levels import level_figures
 from evaluation.table.rows import ResultTable
 from sim import scene
 
@@ -197,6 +200,16 @@ def test_the_page_of_measured_levels_is_that_of_the_runs_kept() -> None:
     made = runpy.run_path(str(ROOT / "docs" / "measured_levels.py"))["page"]()
     page = (ROOT / "docs" / "measured_levels.md").read_text(encoding="utf-8")
     assert page == made, "runs or tables have changed: run docs/measured_levels.py, or make docs"
+
+
+def test_the_pictures_of_measured_levels_are_those_of_the_runs_kept(tmp_path: Path) -> None:
+    measured = runpy.run_path(str(ROOT / "docs" / "measured_levels.py"))["measured_levels"]()
+    for made in level_figures(measured):
+        kept, new = ROOT / "docs" / "pictures" / f"{made.name}.png", tmp_path / f"{made.name}.png"
+        write_png(made.figure, new)
+        # Not byte by byte: libraries of another machine may round lines otherwise.
+        off = compare_images(str(kept), str(new), tol=0.5)
+        assert off is None, f"runs have changed: run docs/measured_levels.py, or make docs\n{off}"
 
 
 def test_every_row_of_the_parameters_stands_alone() -> None:

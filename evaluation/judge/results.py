@@ -36,7 +36,7 @@ class Results:
         showcase: Data of the pictures; None without pictures.
         notes: Sentences for the end of the report.
         level: The level of difficulty; None where none was asked for, and for several.
-        levels: What was measured at each of several levels, in order of appearance.
+        levels: What was measured at each of several levels, in the order of tables.
     """
 
     table: ResultTable
@@ -105,4 +105,5 @@ def _by_level(parts: Sequence[Results]) -> list[AtLevel]:
     for part in parts:
         if part.level is not None:
             tables.setdefault(part.level, []).append(part.table)
-    return [AtLevel(level, ResultTable.concat(found)) for level, found in tables.items()]
+    marks = sorted(tables, key=lambda mark: mark.place)
+    return [AtLevel(mark, ResultTable.concat(tables[mark])) for mark in marks]

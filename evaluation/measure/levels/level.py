@@ -26,8 +26,6 @@ from sim.recording.recorder import Flight
 from sim.scene import Scene, load_scene
 from sim.sensors.presets import sensor_preset
 
-LevelName = Literal["paper", "easy", "medium", "hard", "extreme"]
-
 AtLeastOne = Annotated[int, Field(ge=1)]
 
 

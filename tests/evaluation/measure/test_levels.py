@@ -16,10 +16,10 @@ from evaluation.cli import parse
 from evaluation.commands.reproduce import Reproduce
 from evaluation.judge.runs import against
 from evaluation.judge.summary import build_summary
-from evaluation.measure.levels.level import LevelName, load_level, parse_level
+from evaluation.measure.levels.level import load_level, parse_level
 from evaluation.measure.plans.reproduce import Plan
 from evaluation.measure.work.measure import recording_name
-from evaluation.setup.level_mark import LevelMark
+from evaluation.setup.level_mark import LevelMark, LevelName
 from sim.scene import load_scene
 from tests.evaluation.judge.flights import make_results
 from tests.evaluation.show.made_runs import INFO, made_run

@@ -14,6 +14,7 @@ from evaluation.show.report.page import write_results
 from evaluation.table.rows import ResultTable, Row
 from tests.evaluation.judge.flights import CONDITION, make_results
 
+IN_ORDER = (("paper", 1), ("hard", 1), ("hard", 2), ("a colleague's", 1))
 MARKS = [LevelMark(name=name, version=1) for name in ("easy", "hard")]
 
 
@@ -38,6 +39,14 @@ def test_success_falls_from_level_to_level() -> None:
     assert "wrong claims: 0 of" in easy
     (figure,) = level_figures(both.levels)
     assert figure.name == "levels"
+
+
+def test_levels_stand_in_order_whatever_that_of_the_runs() -> None:
+    marks = [LevelMark(name=name, version=version) for name, version in IN_ORDER]
+    parts = [results_at(mark, 1.0) for mark in marks]
+    for order in ((2, 0, 3, 1), (3, 2, 1, 0)):
+        found = merged([parts[index] for index in order]).levels
+        assert [one.level for one in found] == marks
 
 
 def rivals(mark: LevelMark, near: int, trials: int = 8, turned_deg: float = 1.0) -> ResultTable:
