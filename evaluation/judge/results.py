@@ -105,5 +105,5 @@ def _by_level(parts: Sequence[Results]) -> list[AtLevel]:
     for part in parts:
         if part.level is not None:
             tables.setdefault(part.level, []).append(part.table)
-    marks = sorted(tables, key=lambda mark: mark.place)
+    marks = sorted(tables, key=lambda mark: mark.sort_key)
     return [AtLevel(mark, ResultTable.concat(tables[mark])) for mark in marks]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, get_args
+from typing import Annotated
 
 from pydantic import Field
 
 from airground.errors import InputError
 from evaluation.setup.checked_json import Part
 
-LevelName = Literal["paper", "easy", "medium", "hard", "extreme"]
+LEVELS = ("paper", "easy", "medium", "hard", "extreme")
 """The levels that come with airground, in the order of tables."""
 
 
@@ -23,10 +23,10 @@ class LevelMark(Part):
         return f"{self.name} {self.version}"
 
     @property
-    def place(self) -> tuple[int, str, int]:
+    def sort_key(self) -> tuple[int, str, int]:
         """What tables sort levels by: in order, and others after them."""
-        names = get_args(LevelName)
-        return names.index(self.name) if self.name in names else len(names), self.name, self.version
+        known = LEVELS.index(self.name) if self.name in LEVELS else len(LEVELS)
+        return known, self.name, self.version
 
 
 def check_same_level(first: LevelMark | None, second: LevelMark | None, name: str) -> None:

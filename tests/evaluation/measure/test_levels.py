@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import get_args
 
 import pytest
 import tomli_w
@@ -19,12 +18,11 @@ from evaluation.judge.summary import build_summary
 from evaluation.measure.levels.level import load_level, parse_level
 from evaluation.measure.plans.reproduce import Plan
 from evaluation.measure.work.measure import recording_name
-from evaluation.setup.level_mark import LevelMark, LevelName
+from evaluation.setup.level_mark import LEVELS, LevelMark
 from sim.scene import load_scene
 from tests.evaluation.judge.flights import make_results
 from tests.evaluation.show.made_runs import INFO, made_run
 
-NAMES = get_args(LevelName)
 DIGESTS = {
     "paper 1": "d965402b75c29696",
     "easy 1": "accc3444c4683e55",
@@ -57,7 +55,7 @@ def stated(value: object) -> object:
     return {name: stated(one) for name, (one, default) in given.items() if one != default}
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", LEVELS)
 def test_no_level_changes_under_its_name_and_version(name: str) -> None:
     level = load_level(name)
     flown = [
@@ -161,10 +159,10 @@ def test_the_page_has_every_level_with_its_dials() -> None:
     page = (Path(__file__).parents[3] / "docs" / "levels.md").read_text(encoding="utf-8")
     rows = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| ")]
     by_name = {cells[0].strip("`").partition("`")[0]: cells for cells in rows}
-    columns = [cell.replace("`", "") for cell in rows[0][-len(NAMES) :]]
-    for name in NAMES:
+    columns = [cell.replace("`", "") for cell in rows[0][-len(LEVELS) :]]
+    for name in LEVELS:
         level = load_level(name)
-        column = columns.index(str(level.mark)) - len(NAMES)
+        column = columns.index(str(level.mark)) - len(LEVELS)
         for scene in level.scenes:
             for dial, value in level.point(load_scene(scene)).items():
                 assert f"{value:g}" in by_name[dial][column]
