@@ -109,7 +109,7 @@ class ChannelOverlay:
     Attributes:
         places, levels: (2, K) and (K, S) aerial cells as `channel_sums` takes them.
         ground: (nx, ny) ground as `channel_sums` takes it.
-        first: (2,) lattice index of `ground`[0, 0].
+        first: (2,) lattice index of the first cell of `ground`.
         cells_per_m, stride: Resolution of the ground; every so many of its cells are looked at.
     """
 

@@ -150,7 +150,8 @@ class MonteCarloLocalizer:
             newest_agreed = agreement(newest, pair.ground)
         fit = Fit(overlay, agreed, pair.newest_overlap(estimate), newest_agreed)
         if self._local.in_nat:
-            evidence = -float(pair.costs(estimate[None])[0])
+            # Without a cost, as little is known as by chance.
+            evidence = -float(np.nan_to_num(pair.costs(estimate[None])[0]))
             fit = replace(fit, evidence=evidence, lead=pair.volume.lead(estimate))
         refusal = why_refused(fit, particles, self._local)
         return refusal or why_ambiguous(pair.aerial, laid, pair.ground, self._local)

@@ -16,37 +16,37 @@ from airground.core.se3 import SE3
 
 @dataclass(frozen=True, eq=False)
 class PoseErrors:
-    """Covariances of the robots' poses when a surface was finished, as their SLAM states them.
+    """How well both robots' rotations were known when a surface was finished, as SLAM states it.
+
+    Positions do not count: the aerial surface moves with the MAV's camera, and the ground map
+    around the ground robot has drifted as the robot itself.
 
     Attributes:
         lever_mav: (3,) from the middle of the aerial surface to the MAV's camera, in `mav` [m].
-        of_mav, of_ground: (6, 6) covariance of a camera's position [m] and rotation [rad], in the
-            axes of `mav` and of `ground`.
+        turns_mav, turns_ground: (3, 3) covariance of a camera's rotation [rad^2], in the axes of
+            `mav` and of `ground`.
     """
 
     lever_mav: F64
-    of_mav: F64
-    of_ground: F64
+    turns_mav: F64
+    turns_ground: F64
 
     def __post_init__(self) -> None:
-        for name, shape in (("lever_mav", (3,)), ("of_mav", (6, 6)), ("of_ground", (6, 6))):
+        for name, shape in (("lever_mav", (3,)), ("turns_mav", (3, 3)), ("turns_ground", (3, 3))):
             freeze(self, name, shape, np.float64)
 
     @classmethod
     def none(cls) -> PoseErrors:
         """Poses without an error."""
-        return cls(np.zeros(3), np.zeros((6, 6)), np.zeros((6, 6)))
+        return cls(np.zeros(3), np.zeros((3, 3)), np.zeros((3, 3)))
 
     def covariance(self, heading: float) -> F64:
         """(2, 2) covariance of the camera's x and y in `ground` [m^2], with `mav` turned by a
         heading [rad]."""
         turn = SE3.from_heading(heading).rotation
         leaning = _leaning(turn @ self.lever_mav)
-        # The surface moves with the MAV's camera: of its pose only the rotation counts.
-        rotation = turn @ self.of_mav[3:, 3:] @ turn.T
-        # The newest pose of the ground robot is off against its map, which is older.
-        moved = np.hstack([np.eye(3), leaning])
-        total: F64 = leaning @ rotation @ leaning.T + moved @ self.of_ground @ moved.T
+        turns = turn @ self.turns_mav @ turn.T + self.turns_ground
+        total: F64 = leaning @ turns @ leaning.T
         return total[:2, :2]
 
 

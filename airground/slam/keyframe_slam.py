@@ -210,7 +210,7 @@ class KeyframeSlam:
 
     def covariance(self, fit: PoseFit, scale_sigma: float, tilt_sigma: float) -> F64:
         """(6, 6) of the newest pose, within the map and of the map; to be asked once an image."""
-        motion = fit.T_map_camera.translation, self.state.velocity
+        motion = fit.T_map_camera, self.state.velocity
         shared = self._shared_errors.at(*motion, scale_sigma, tilt_sigma)
         shared += self._bridge.covariance(self.tracker.ids, tilt_sigma)
         return fit.covariance + self._keyframe_covariance + shared

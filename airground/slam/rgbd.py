@@ -12,6 +12,7 @@ from airground.core.trajectory import Trajectory
 from airground.slam.frame import Frame, require_order
 from airground.slam.front_end import TrackedPose, Tracking
 from airground.slam.keyframe_slam import KeyframeSlam
+from airground.slam.known_vertical import LEVEL_SIGMA, KnownVertical
 from airground.slam.stale_images import StaleImages
 from airground.slam.starts import StandStill, level_start
 
@@ -20,8 +21,6 @@ HAND_HELD = 1.5
 while its rows are read out."""
 MIN_FIRST_POINTS = 40
 """Least number of corners with depth in a map's first image."""
-LEVEL_SIGMA = np.deg2rad(0.3)
-"""Standard deviation of the vertical at rest per axis [rad]: an accelerometer bias of 50 mm/s^2."""
 
 
 class RgbdSlam:
@@ -43,6 +42,7 @@ class RgbdSlam:
         )
         self._slam.metric = True
         self._standing = StandStill(calibration)
+        self._vertical = KnownVertical()
         self._most_points = 0
         self._images = StaleImages(self._slam)
         self._last_ns: int | None = None
@@ -70,11 +70,14 @@ class RgbdSlam:
                 slam.stand_still(frame, rest)
                 corrected = True
         slam.note(image.stamp_ns)
+        level_sigma = LEVEL_SIGMA
+        if slam.inertial:
+            level_sigma = self._vertical.sigma(image.stamp_ns, slam.state.rotation)
         return TrackedPose(
             image.stamp_ns,
             Tracking.TRACKED,
             slam.T_map_camera(),
-            covariance=slam.covariance(fit, slam.calibration.sigmas.depth_scale, LEVEL_SIGMA),
+            covariance=slam.covariance(fit, slam.calibration.sigmas.depth_scale, level_sigma),
             depth_range=slam.depth_range(),
             corrected=corrected,
             corners=slam.corners(),

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.core.messages import CalibrationSigmas
+from airground.core.se3 import SE3
 from airground.slam import so3
-from airground.slam.shared_errors import BENDS_M, SharedErrors
+from airground.slam.shared_errors import BENDS_M, HEADING_WALK, SharedErrors
 
 SIGMAS = CalibrationSigmas(mounting_rad=0.002, clock_s=0.003)
 PATH = np.array([[0.0, 0.0, 0.0], [1.0, 0.5, 0.2], [2.5, 0.0, 0.4], [2.0, -1.0, 1.5]])
@@ -15,12 +16,18 @@ STILL = np.zeros(3)
 
 
 def along(
-    path: NDArray, scale_sigmas: list[float], tilt_sigmas: list[float], velocity: NDArray = STILL
+    path: NDArray,
+    scale_sigmas: list[float],
+    tilt_sigmas: list[float],
+    velocity: NDArray = STILL,
+    headings: NDArray | None = None,
 ) -> NDArray:
-    """The covariance at the end of a path, without the bends."""
+    """The covariance at the end of a path, without the bends; a robot without headings never
+    turns."""
     errors = SharedErrors(SIGMAS)
-    for place, scale_sigma, tilt_sigma in zip(path, scale_sigmas, tilt_sigmas, strict=True):
-        covariance = errors.at(place, velocity, scale_sigma, tilt_sigma)
+    facing = np.zeros(len(path)) if headings is None else headings
+    for place, heading, *sigmas in zip(path, facing, scale_sigmas, tilt_sigmas, strict=True):
+        covariance = errors.at(SE3.from_heading(heading, place), velocity, *sigmas)
     covariance[:3, :3] -= BENDS_M**2 * np.eye(3)
     return covariance
 
@@ -65,6 +72,25 @@ def test_the_place_stays_where_scale_and_vertical_become_better_known() -> None:
     assert_close(along(PATH, scale_sigmas, tilt_sigmas), errors)
 
 
+def test_the_heading_drifts_with_every_turn_and_takes_the_way_along() -> None:
+    rng = np.random.default_rng(6)
+    headings = np.array([0.0, 2.0, -1.0, 1.5])
+    turned = np.abs(np.diff(headings))
+    errors = []
+    for _ in range(20_000):
+        off = np.cumsum(HEADING_WALK * np.sqrt(turned) * rng.normal(size=len(turned)))
+        steps = np.diff(PATH, axis=0)
+        place = sum(
+            np.cross([0.0, 0.0, angle], step) for angle, step in zip(off, steps, strict=True)
+        )
+        turn = np.array([0.0, 0.0, off[-1]]) + rng.normal(0, SIGMAS.mounting_rad, 3)
+        errors.append(np.concatenate([place, turn]))
+    covariance = along(PATH, [0.0] * 4, [0.0] * 4, headings=headings)
+    np.testing.assert_allclose(covariance[2], [0, 0, 0, 0, 0, 0], atol=1e-15)
+    level = [0, 1, 3, 4, 5]
+    assert_close(covariance[np.ix_(level, level)], np.array(errors)[:, level])
+
+
 def test_back_where_it_began_there_is_no_error_of_scale_and_vertical() -> None:
     there_and_back = np.concatenate([PATH, PATH[::-1]])
     count = len(there_and_back)
@@ -82,7 +108,7 @@ def test_it_is_a_covariance_whatever_the_sigmas_do() -> None:
     path = np.cumsum(rng.normal(0, 0.3, (200, 3)), axis=0)
     errors = SharedErrors(SIGMAS)
     for place in path:
-        sigmas = rng.uniform(0, 0.02, 2)
-        covariance = errors.at(place, rng.normal(0, 1, 3), *sigmas)
+        sigmas, pose = rng.uniform(0, 0.02, 2), SE3.from_heading(rng.uniform(-3, 3), place)
+        covariance = errors.at(pose, rng.normal(0, 1, 3), *sigmas)
         np.testing.assert_allclose(covariance, covariance.T, atol=1e-15)
         assert np.linalg.eigvalsh(covariance)[0] > -1e-12
