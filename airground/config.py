@@ -264,15 +264,17 @@ class Refinement(Section):
     """Whether the height maps around the start are searched before ICP."""
     local_search_radius_m: Positive = 0.6
     """Half the side of that search [m]."""
-    local_search_angle_deg: Annotated[float, Field(ge=0, le=180)] = 8.0
-    """Largest turn of that search to either side, in steps of 2 deg [deg]."""
+    local_search_angle_deg: Annotated[float, Field(ge=0, le=180)] = 16.0
+    """Largest turn of that search to either side, in steps of 4 deg [deg]."""
     local_search_cells_per_m: Positive = 25.0
     """Resolution of that search [cells/m]."""
+    local_search_tolerance_m: Positive = 0.3
+    """Largest difference of heights that counts in that search; larger ones count as this [m]."""
     level_prior: bool = True
     """Whether only the heading of a prior's rotation is kept: both maps are gravity-aligned."""
     voxel_m: Positive = 0.03
     """Side of the cubes over which clouds are averaged before ICP [m]."""
-    max_distance_m: Positive = 0.3
+    max_distance_m: Positive = 0.1
     """Largest distance of correspondences in the first step [m]."""
     final_distance_m: Positive = 0.05
     """Largest distance of correspondences in the last steps [m]."""
@@ -338,7 +340,7 @@ def _as_published(preset: PresetName, sigma: float) -> Config:
             estimate="mean",
             redrawn_fraction=0.0,
         ),
-        refinement=Refinement(local_search=False, level_prior=False),
+        refinement=Refinement(local_search=False, level_prior=False, max_distance_m=0.3),
     )
 
 

@@ -92,7 +92,7 @@ def test_paper_comes_back_from_nearby(heap):
 def test_one_box_on_a_large_floor_is_enough(start):
     """Most points lie on the floor wherever they are put; the box alone says where they belong."""
     rng = np.random.default_rng(4)
-    settings = Config().refinement
+    settings = paper().refinement
     source, target = (make_surfels(floor_with_one_box(rng), settings.voxel_m) for _ in range(2))
     x, y, heading_deg = start
     fit = point_to_plane_icp(

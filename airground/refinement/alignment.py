@@ -22,7 +22,7 @@ MIN_POINTS = 200
 """Least number of points of a cloud, and of the aerial points over the ground map."""
 COVER_CELLS_PER_M = 25.0
 """Resolution at which the aligned maps are compared [cells/m]: twice a voxel of the ground map."""
-TURNING_MARGIN_M = 0.3
+TURNING_MARGIN_M = 0.6
 """What the searched headings move the edge of a surface of 4 m by [m]."""
 
 

@@ -18,7 +18,13 @@ CENTRAL = (0.01, 0.99)
 """Quantiles along x and y that bound the extent: a few stray points do not count."""
 SAMPLES = 2000
 """Largest number of points at which the spacing is measured: its median is known to 3 %."""
-LENGTHS = ("local_search_radius_m", "voxel_m", "max_distance_m", "final_distance_m")
+LENGTHS = (
+    "local_search_radius_m",
+    "local_search_tolerance_m",
+    "voxel_m",
+    "max_distance_m",
+    "final_distance_m",
+)
 
 
 def without_strays(points: F32) -> F32:

@@ -28,6 +28,7 @@ SWITCH_OF: dict[str, tuple[str, str | bool | tuple[str, ...]]] = {
     "refinement.local_search_radius_m": LOCAL_SEARCH,
     "refinement.local_search_angle_deg": LOCAL_SEARCH,
     "refinement.local_search_cells_per_m": LOCAL_SEARCH,
+    "refinement.local_search_tolerance_m": LOCAL_SEARCH,
 }
 """The parameter that switches another one on, and with which value or values."""
 
