@@ -286,6 +286,8 @@ class Refinement(Section):
     """Least share of the aerial points over the ground map that lie on it."""
     min_agreement: Fraction = 0.2
     """Least agreement of the maps beyond chance (Cohen's kappa, core/agreement.py)."""
+    near_claim: bool = True
+    """Whether an alignment is refused that leads away from the place that localization claims."""
 
 
 class Config(Section):
@@ -340,7 +342,9 @@ def _as_published(preset: PresetName, sigma: float) -> Config:
             estimate="mean",
             redrawn_fraction=0.0,
         ),
-        refinement=Refinement(local_search=False, level_prior=False, max_distance_m=0.3),
+        refinement=Refinement(
+            local_search=False, level_prior=False, max_distance_m=0.3, near_claim=False
+        ),
     )
 
 

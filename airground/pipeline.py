@@ -206,6 +206,7 @@ class Pipeline:
             surface.cloud_mav,
             sighting.ground_cloud,
             self._config,
+            claimed=not self._has_prior,
         )
         yield Aligned(surface.stamp_ns, alignment)
         if not alignment.accepted:

@@ -79,6 +79,25 @@ def test_best_comes_back_from_the_papers_noise(heap):
         assert alignment.rmse_m < 0.02
 
 
+def test_an_alignment_that_leads_away_from_a_claim_is_refused(heap):
+    for shift, accepted in ((0.15, True), (0.3, False)):
+        start = SE3(np.eye(3), np.array([shift, 0.0, 0.0])) @ T_WORLD_MAV
+        assert refine(0, start, *heap, Config()).accepted
+        alignment = refine(0, start, *heap, Config(), claimed=True)
+        assert alignment.accepted == accepted
+        assert alignment.refusal.startswith("leads away: 0.30 m") == (not accepted)
+        assert error(alignment.T_ground_mav)[0] < 0.01
+
+
+def test_an_alignment_that_turns_a_claim_far_is_refused(heap):
+    turn = SE3.from_heading(np.deg2rad(6.0)).rotation
+    start = SE3(turn, CAMERA - turn @ CAMERA) @ T_WORLD_MAV
+    assert refine(0, start, *heap, Config()).accepted
+    alignment = refine(0, start, *heap, Config(), claimed=True)
+    assert not alignment.accepted
+    assert "6.0 deg from the place that is claimed" in alignment.refusal
+
+
 def test_paper_comes_back_from_nearby(heap):
     rng = np.random.default_rng(2)
     for _ in range(2):
