@@ -255,8 +255,7 @@ class Refinement(Section):
     lengths are multiplied by one factor (`extent_m`, `spacing_m`)."""
 
     extent_m: Positive = 10.0
-    """Extent of the aerial surface up to which lengths hold as given; beyond, they grow with it
-    [m]."""
+    """Extent of the aerial surface up to which lengths hold; beyond, they grow with it [m]."""
     spacing_m: Positive = 0.06
     """Median distance of neighbouring points, after `voxel_m`, up to which lengths hold as given;
     beyond, they grow with it [m]."""
