@@ -61,6 +61,7 @@ def test_maps_that_do_not_overlap_have_no_start():
     assert search_nearby(world(BOXES), ground, start(9.0), Config().refinement) is None
 
 
+@pytest.mark.kernel
 @given(st.integers(0, 2**32 - 1), st.integers(0, 4))
 @settings(max_examples=30, deadline=None)
 def test_costs_are_those_of_the_obvious_sum(seed, reach):
