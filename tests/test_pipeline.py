@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from airground.config import Config
+from airground.core.belief import Alignment, Belief
 from airground.core.camera import PinholeCamera
-from airground.core.cloud import Source
+from airground.core.cloud import PointCloud, Source
 from airground.core.events import (
     Aligned,
     BeliefUpdated,
@@ -29,11 +30,15 @@ from airground.core.messages import (
     Stamped,
 )
 from airground.core.se3 import SE3
+from airground.core.sighting import Sighting
+from airground.core.surface import AerialSurface
 from airground.core.trajectory import Trajectory
+from airground.localization.height_map_pair import HeightMapPair
 from airground.pipeline import NO_HEADING, NO_POSE, Pipeline
 from airground.slam.front_end import TrackedPose, Tracking
 from airground.tracking import FrontEnds, TrackedFrame, Trackers
 from tests.dense.synthetic import CAMERA, flight, heap_world, noisy
+from tests.localization.synthetic import aerial_points, box_heap, ground_points
 
 GROUND_CAMERA = PinholeCamera(320, 240, 262.0, 262.0, 159.5, 119.5)
 T_WORLD_MAV = SE3.from_heading(0.6, [1.5, -0.4, 0.8])
@@ -64,6 +69,21 @@ class Known:
     def trajectory(self) -> Trajectory | None:
         known = {stamp: pose for stamp, pose in self.poses.items() if pose is not None}
         return Trajectory.from_poses(list(known), list(known.values())) if known else None
+
+
+class Claimed:
+    """A localizer that claims one place for every surface."""
+
+    config = Config()
+
+    def __init__(self, T_ground_mav: SE3) -> None:
+        nothing, unknown = np.zeros((1, 3)), np.zeros(3)
+        self.belief = Belief(
+            0, nothing, unknown, np.eye(2), 0.0, 0.0, T_ground_mav, converged=True, refusal=""
+        )
+
+    def update(self, pair: HeightMapPair) -> Iterator[Event]:
+        yield BeliefUpdated(pair.stamp_ns, self.belief)
 
 
 class Recorded:
@@ -211,3 +231,40 @@ def test_lost_tracking_is_reported_and_maps_nothing(recorded: Recorded) -> None:
     assert len(of(events, TrackingLost)) == len(lost)
     assert not of(events, SurfaceCast)
     assert (pipeline.augmented_map().sources == Source.GROUND).all()
+
+
+def test_a_claim_binds_refinement_and_a_prior_does_not() -> None:
+    """A prior is a guess of the user, from which refinement may lead away (Sec. III)."""
+    away = SE3.from_heading(0.0, [0.3, 0.0, 0.0]) @ T_WORLD_MAV
+    located = empty_pipeline()
+    located._localizer = Claimed(away)
+    refused, taken = aligned(located), aligned(empty_pipeline(away))
+    assert refused.refusal.startswith("leads away: 0.30 m"), refused.refusal
+    assert not refused.accepted
+    assert taken.accepted, taken.refusal
+    for alignment in (refused, taken):
+        error = alignment.T_ground_mav @ T_WORLD_MAV.inverse()
+        assert np.linalg.norm(error.translation) < 0.01
+
+
+def aligned(pipeline: Pipeline) -> Alignment:
+    """What one surface over a heap of boxes is refined to."""
+    events = list(pipeline.locate_and_augment(sighting_of_boxes()))
+    accepted = of(events, Aligned)[-1].alignment
+    assert bool(of(events, MapAugmented)) == accepted.accepted
+    return accepted
+
+
+def sighting_of_boxes() -> Sighting:
+    world, rng = box_heap(1), np.random.default_rng(0)
+    above = SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.2, 0.3, 2.2]))
+    aerial = T_WORLD_MAV.inverse() @ aerial_points(world, *above.translation[:2], rng)
+    no_depth = np.full((CAMERA.height, CAMERA.width), np.nan, np.float32)
+    T_mav_camera = T_WORLD_MAV.inverse() @ above
+    surface = AerialSurface(0, 0, CAMERA, T_mav_camera, no_depth, grey_cloud(aerial), 1)
+    ground = grey_cloud(ground_points(world, rng, frames=40))
+    return Sighting(surface, ground, 0, T_mav_camera, 0, SE3.identity(), heading=0.6)
+
+
+def grey_cloud(points: np.ndarray) -> PointCloud:
+    return PointCloud(points.astype(np.float32), np.zeros((len(points), 3), np.uint8))
