@@ -72,6 +72,8 @@ def _failing(name: str, kind: FaultKind, does: str) -> Dial:
     )
 
 
+LOWEST_FLIGHT_M = round(MAX_HEAP_HEIGHT_M + 0.1, 3)  # the sum of the two floats is above 1.2
+
 DIALS = (
     Dial(
         "scene.overlap", "", 0.05, 1.0,
@@ -106,7 +108,7 @@ DIALS = (
         lambda subject, value: _part(subject, "rubble", size_scale=value),
     ),
     Dial(
-        "scene.flight_height", "m", MAX_HEAP_HEIGHT_M + 0.1, 10.0,
+        "scene.flight_height", "m", LOWEST_FLIGHT_M, 10.0,
         "height of the MAV's flight above the ground",
         lambda subject, value: _part(subject, "mav", height_m=value),
     ),
