@@ -250,9 +250,9 @@ def test_a_claim_binds_refinement_and_a_prior_does_not() -> None:
 def aligned(pipeline: Pipeline) -> Alignment:
     """What one surface over a heap of boxes is refined to."""
     events = list(pipeline.locate_and_augment(sighting_of_boxes()))
-    accepted = of(events, Aligned)[-1].alignment
-    assert bool(of(events, MapAugmented)) == accepted.accepted
-    return accepted
+    (event,) = of(events, Aligned)
+    assert bool(of(events, MapAugmented)) == event.alignment.accepted
+    return event.alignment
 
 
 def sighting_of_boxes() -> Sighting:
