@@ -20,7 +20,7 @@ from tests.negatives.views import View
 
 BOXES = 80
 CHANGED = 0.3
-"""Share of the boxes that lie elsewhere when the MAV comes, as in level `extreme`."""
+"""Share of the boxes that lie elsewhere when the MAV comes, as in level `extreme` 1."""
 STEP_M = 0.3
 """Distance that the MAV flies from one aerial map to the next [m]."""
 HEIGHT_M = 2.2
