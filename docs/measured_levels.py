@@ -14,6 +14,7 @@ from airground.errors import InputError
 from evaluation.judge import samples
 from evaluation.judge.results import CONFIG, SUMMARY, TABLE, AtLevel, merged, read_results
 from evaluation.judge.summary import Summary
+from evaluation.measure.protocol import wide_search
 from evaluation.measure.protocol.negatives import CASES
 from evaluation.setup.console import EXIT_ERROR
 from evaluation.setup.output import fresh_folder
@@ -44,9 +45,11 @@ PICTURES = PAGE.parent / "pictures"
 """Where the pictures of several levels lie, each named after its figure."""
 STAGES = (
     *("localization", "baseline", "alignment", "refinement", "trajectory", "appearance"),
+    *("surface", wide_search.STAGE),
     *(case.stage for case in CASES),
 )
-"""Stages whose rows are kept; of the times only those of `PER_MAP`, as a repository is small."""
+"""Stages whose rows are kept: all that `compare` and the tables need; of the times only those of
+`PER_MAP`, as a repository is small."""
 INTRODUCTION = """\
 # Measured levels
 

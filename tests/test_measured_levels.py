@@ -8,10 +8,12 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from airground.config import Config
 from airground.errors import InputError
+from evaluation.judge.accepted import Measured
 from evaluation.judge.results import Results, read_results
 from evaluation.setup.level_mark import LevelMark
 from evaluation.show.report.page import write_results
@@ -27,7 +29,10 @@ HARD = LevelMark(name="hard", version=1)
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of `best` at a level, of which all sequences are right."""
     folder = tmp_path_factory.mktemp("run")
-    write_results(Results(make_results(range(4), lost=0.0), Config(), 0, level=HARD), folder)
+    frame = make_results(range(4), lost=0.0).frame
+    timed = frame.head(1).assign(stage="timing", metric="tracking_ms", value=20.0, unit="ms")
+    table = ResultTable(pd.concat([frame, timed], ignore_index=True))
+    write_results(Results(table, Config(), 0, level=HARD), folder)
     return folder
 
 
@@ -36,6 +41,7 @@ def test_a_run_is_kept_with_fewer_rows_and_the_same_table(run: Path, tmp_path: P
     kept = tmp_path / "hard" / "best"
     whole, few = read_results(run).table, read_results(kept).table
     assert 0 < len(few) < len(whole)
+    assert Measured.of(few) == Measured.of(whole), "compare has all that it judges"
     page = MEASURED["page"](tmp_path)
     assert "## `hard` 1" in page
     assert "All levels" not in page
