@@ -23,7 +23,7 @@ ACTION: dict[str, Any] = yaml.safe_load((ROOT / "action.yml").read_text(encoding
 STEPS: list[dict[str, Any]] = ACTION["runs"]["steps"]
 AIRGROUND = """#!/usr/bin/env bash
 # The suite takes minutes: its results are those of the test.
-if [ "$1" = reproduce ]; then exec cp -r "{prepared}" "${{@: -1}}"; fi
+if [ "$1" = reproduce ]; then echo "$@" > "{asked}"; exec cp -r "{prepared}" "${{@: -1}}"; fi
 PYTHONPATH="{root}" exec "{python}" -c "from evaluation.cli import main; main()" "$@"
 """
 LONGEST_STEP_S = 600
@@ -88,7 +88,9 @@ def runner(folder: Path, factors: dict[str, float] | None, **inputs: str) -> Run
     programs.mkdir(parents=True)
     (programs / "python").symlink_to(sys.executable)
     (programs / "airground").write_text(
-        AIRGROUND.format(prepared=prepared, root=ROOT, python=sys.executable)
+        AIRGROUND.format(
+            asked=folder / "asked", prepared=prepared, root=ROOT, python=sys.executable
+        )
     )
     (programs / "airground").chmod(0o755)
     (folder / "action" / "Makefile").write_text("setup:\n\t@true\n")
@@ -132,6 +134,23 @@ def test_unchanged_accuracy_passes_and_publishes(tmp_path: Path) -> None:
         cwd=tmp_path / "remote.git", capture_output=True, check=True,
     )  # fmt: skip
     assert json.loads(kept.stdout)["message"] == "no difference seen"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("suite", "file"), [("fast", "accepted.json"), ("faults", "accepted_faults.json")]
+)
+def test_a_suite_is_compared_with_its_own_accepted_results(
+    suite: str, file: str, tmp_path: Path
+) -> None:
+    run = runner(tmp_path, None, suite=suite, against="")
+    (tmp_path / "action" / "evaluation").mkdir()
+    (tmp_path / "accepted.json").rename(tmp_path / "action" / "evaluation" / file)
+    done = run.run()
+    assert done.failed == ""
+    assert done.values["steps.check.outputs.verdict"] == "no difference seen"
+    asked = (tmp_path / "asked").read_text(encoding="utf-8")
+    assert f"--suite {suite} " in asked
 
 
 @pytest.mark.slow
