@@ -5,6 +5,9 @@ OUT ?= results/demo
 # Tests run in parallel, those of a file in one process; more processes need too much memory.
 PYTEST := $(PYTHON_IN_VENV) -m pytest -q --numprocesses=$(shell nproc) --maxprocesses=4 --dist=loadfile
 
+# Else each process compiles all that it imports, which takes it 7 s; images of containers set this.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo setup test test-slow test-all test-uncompiled check docs regression fuzz format clean
 
 demo: $(READY)
