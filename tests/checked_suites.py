@@ -105,7 +105,7 @@ def sample(results: Path, path: Path = FILE) -> str:
 
 
 def measured_sample(name: SuiteName, plan: Plan, out: Path) -> Digests:
-    """Of each version of the sources, tests and pages included, other flights."""
+    """What some flights give: other flights for each version of the sources, tests included."""
     from evaluation.measure.work.crew import Crew
     from evaluation.measure.work.measure import measure
     from evaluation.measure.work.out_folder import resumable_folder
