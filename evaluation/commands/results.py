@@ -26,7 +26,12 @@ def accepted_file(results: Path) -> Path:
 
     conditions = read_table(results).conditions()
     suite = re.fullmatch("suite ([a-z]+)", conditions[0].variant if conditions else "")
-    return ACCEPTED if suite is None else ACCEPTED.with_stem(f"accepted_{suite[1]}")
+    return accepted_figures("fast" if suite is None else suite[1])
+
+
+def accepted_figures(suite: str) -> Path:
+    """Where the accepted figures of a suite are."""
+    return ACCEPTED if suite == "fast" else ACCEPTED.with_stem(f"accepted_{suite}")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -189,10 +189,7 @@ class Accepted(Part):
         return Measured(self.suite, Condition(**vars(self.condition)), self.flights, samples)
 
     def write(self, path: Path) -> None:
-        """Write one line per flight and metric, so that a diff shows the changes."""
-        made = self.model_dump(by_alias=True, mode="json")
-        lines = json.dumps(made, indent=1, allow_nan=False, ensure_ascii=False)
-        write_whole(path, _compact(lines) + "\n")
+        write_whole(path, compact_json(self))
 
     @classmethod
     def read(cls, path: Path) -> Accepted:
@@ -209,6 +206,10 @@ def _number(value: float) -> float | None:
     return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None
 
 
-def _compact(text: str) -> str:
-    """Put lists of plain values on one line each; no string holds a raw line break."""
-    return re.sub(r"\[\n[^\[\]{}]*\]", lambda found: " ".join(found.group().split()), text)
+def compact_json(part: Part) -> str:
+    """JSON with lists of plain values on one line each, so that a diff shows the changes."""
+    made = part.model_dump(by_alias=True, mode="json")
+    text = json.dumps(made, indent=1, allow_nan=False, ensure_ascii=False)
+    # No string holds a raw line break.
+    lists = re.compile(r"\[\n[^\[\]{}]*\]")
+    return lists.sub(lambda found: " ".join(found.group().split()), text) + "\n"
