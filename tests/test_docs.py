@@ -35,8 +35,6 @@ SECTIONS = {name: getattr(Config(), name) for name in Config.model_fields}
 PARAMETER = re.compile(
     rf"(?<!airground\.)\b({'|'.join(n for n in SECTIONS if n != 'preset')})\.(\w+)"
 )
-
-
 ROOMS = "airground|sim|evaluation"
 PATH = re.compile(rf"(?<![\w/.-])(?:\.\./)?((?:{ROOMS}|tests|scenes|docs)/[\w/.*-]*\w)")
 DOTTED = re.compile(rf"(?<![\w/.-])((?:{ROOMS})(?:\.\w+)+)")
@@ -47,9 +45,6 @@ WRITTEN_BY_THE_READER = {
     "evaluation.measure.baselines.highest_heap",
 }
 """The file that add_a_baseline.md asks its reader to write."""
-NOT_FOR_PROGRAMS = re.compile(
-    r"\b(nobody|somebody|anybody|everybody|told|tells|lived|wanting)\b", re.IGNORECASE
-)
 
 
 def offenders(found_in: Callable[[Path, str], Iterable[str]]) -> dict[str, list[str]]:
@@ -122,10 +117,6 @@ def is_module(name: str) -> bool:
         return importlib.util.find_spec(name) is not None
     except ModuleNotFoundError:
         return False
-
-
-def test_words_for_persons_name_no_program() -> None:
-    assert offenders(lambda page, text: NOT_FOR_PROGRAMS.findall(text)) == {}
 
 
 def test_parameters_exist() -> None:
