@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -38,7 +39,7 @@ def height_maps_figure(showcase: Showcase) -> Figure:
     """Aerial map, ground map with the aerial footprint at the best u, cost map."""
     figure = Figure(figsize=(WIDE_IN, 3.5), layout="constrained")
     aerial_axes, ground_axes, cost_axes = figure.subplots(1, 3)
-    aerial, ground = showcase.aerial_heights, showcase.ground_heights
+    aerial, ground = seen_part(showcase.aerial_heights), seen_part(showcase.ground_heights)
     step = showcase.steps[0]
 
     low, high = value_range(aerial.heights, 1, 99)
@@ -75,6 +76,16 @@ def height_maps_figure(showcase: Showcase) -> Figure:
         square_panel(axes)
     aerial_axes.set_ylabel("y [m]")
     return figure
+
+
+def seen_part(made: HeightMap) -> HeightMap:
+    """The map within the smallest rectangle that has all its heights: rooms are larger."""
+    seen = np.argwhere(np.isfinite(made.heights))
+    if len(seen) == 0:
+        return made
+    first, last = seen.min(axis=0), seen.max(axis=0)
+    cells = made.heights[first[0] : last[0] + 1, first[1] : last[1] + 1]
+    return replace(made, heights=cells, origin=made.origin + first / made.cells_per_m)
 
 
 def draw_grid(

@@ -10,13 +10,18 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from airground.core.belief import HeightMap
 from airground.core.cloud import PointCloud
 from airground.core.se3 import SE3
 from evaluation.measure.showcase import LocalizationStep, Showcase
 from evaluation.show.figures.boxes import draw_boxes, log_axis
 from evaluation.show.figures.fig05_15_augmented_map import as_believed, refinement_figure
 from evaluation.show.figures.fig06_depth_maps import completeness, depth_maps_figure
-from evaluation.show.figures.fig07_height_maps import draw_grid, height_maps_figure
+from evaluation.show.figures.fig07_height_maps import (
+    draw_grid,
+    height_maps_figure,
+    seen_part,
+)
 from evaluation.show.figures.fig08_particles import ellipse_points, particles_figure
 from evaluation.show.figures.fig11_12_localization_error import (
     localization_error_figure,
@@ -110,6 +115,21 @@ def test_grids_are_drawn_with_x_right_and_y_up() -> None:
     assert shown.get_array()[0, 2] == 1.0
     assert shown.origin == "lower"
     np.testing.assert_allclose(shown.get_extent(), [0.95, 1.25, 4.95, 5.15])
+
+
+def test_the_seen_part_of_a_map_keeps_every_height_at_its_place() -> None:
+    heights = np.full((9, 8), np.nan, np.float32)
+    heights[2, 5], heights[4, 3] = 0.3, 0.7
+    part = seen_part(HeightMap(heights, np.array([-1.0, 2.0]), 10.0))
+    assert part.heights.shape == (3, 3)
+    (left, top), (right, bottom) = np.argwhere(np.isfinite(part.heights))
+    np.testing.assert_allclose(part.origin + np.array([left, top]) / 10, [-0.8, 2.5])
+    np.testing.assert_allclose(part.origin + np.array([right, bottom]) / 10, [-0.6, 2.3])
+
+
+def test_a_map_without_heights_has_no_smaller_part() -> None:
+    empty = HeightMap(np.full((4, 5), np.nan, np.float32), np.zeros(2), 10.0)
+    assert seen_part(empty) is empty
 
 
 @pytest.mark.parametrize("angle", [0.3, -1.1, 2.0])
