@@ -1,4 +1,4 @@
-"""Words for persons, as of a file that "was told" something, are not used of programs and data."""
+"""Words that are right for persons only name no program and no data."""
 
 from __future__ import annotations
 
