@@ -262,7 +262,8 @@ class Reproduce(
         def seconds(flights: list[Flight]) -> float:
             return sum(flight.duration_s or flight.scene.duration_s for flight in flights)
 
-        missing = [f for f in plan.flights if not (recordings / recording_name(f)).exists()]
-        measured_s = seconds(plan.flights) * plan.tasks() / len(plan.flights)
+        flights = plan.certain_flights()
+        missing = [f for f in flights if not (recordings / recording_name(f)).exists()]
+        measured_s = seconds(flights) * plan.tasks() / len(flights)
         rendered_s = measured_s if self.render else seconds(missing)
         return rendered_s * RENDER_S_PER_S + measured_s * MEASURE_S_PER_S

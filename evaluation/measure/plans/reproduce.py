@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from evaluation.measure.protocol.trials import Protocol
 from evaluation.measure.work.crew import Crew
-from evaluation.measure.work.measure import measure, recorded, recording_name
+from evaluation.measure.work.measure import measure, recording_name
 from evaluation.measure.work.unit import Finished, Unit, UnitStore, grouped
 from evaluation.setup.setups import Setup
 from evaluation.table.rows import CONTROL_SCENES, SEQUENCE_KEYS, UNSCORED_SCENES
@@ -50,9 +50,20 @@ class Plan:
             ahead = step * (max(seeds) - min(seeds) + 1)
             yield from (replace(flight, seed=flight.seed + ahead) for flight in flights)
 
+    def certain_flights(self) -> list[Flight]:
+        """`flights`, and those of the further ones that so many sequences need in any case."""
+        scored = [one for one in self.flights if one.scene.name not in UNSCORED_SCENES]
+        missing = self.sequences - len(scored) * self.protocol.sequences
+        return self.flights + list(islice(self.further_flights(), self._least_flights(missing)))
+
+    def _least_flights(self, sequences: int) -> int:
+        """Least number of flights with so many sequences: none gives more than was asked of it."""
+        return max(0, -(-sequences // self.protocol.sequences))
+
     def tasks(self) -> int:
-        """Number of groups of units on the first flights, each one task of a worker."""
-        return len(grouped(unit for flight in self.flights for unit in self.units(flight)))
+        """Number of groups of units on the certain flights, each one task of a worker."""
+        flights = self.certain_flights()
+        return len(grouped(unit for flight in flights for unit in self.units(flight)))
 
     def measured(self, recordings: Path | None, store: UnitStore, crew: Crew) -> Finished:
         """Record and measure what is missing, flight after flight until there are enough sequences.
@@ -65,14 +76,13 @@ class Plan:
             store: Units that an earlier run finished; takes those of this run.
             crew: Processes that do the work.
         """
-        further = self.further_flights()
-        flown = self._flown(self.flights, recordings, store, crew)
-        while (missing := self.sequences - _sequences([units[0] for units in flown])) > 0:
-            # No flight gives more sequences than this, so no flight is flown in vain.
-            flights = list(islice(further, -(-missing // self.protocol.sequences)))
-            if not flights:
-                break  # only unscored scenes
+        flights = self.certain_flights()
+        further = islice(self.further_flights(), len(flights) - len(self.flights), None)
+        flown: list[list[Finished]] = []
+        while flights:
             flown += self._flown(flights, recordings, store, crew)
+            missing = self.sequences - _sequences([units[0] for units in flown])
+            flights = list(islice(further, self._least_flights(missing)))
         return Finished.merged([unit for units in flown for unit in units])
 
     def stranger(self, flight: Flight) -> Flight | None:
@@ -122,11 +132,13 @@ class Plan:
         self, flights: list[Flight], recordings: Path | None, store: UnitStore, crew: Crew
     ) -> list[list[Finished]]:
         """The finished units of each flight, that of the primary setup first."""
-        made: dict[str, Path] = {}
+        places: dict[Path, Flight] = {}
         if recordings is not None:
-            made = {path.name: path for path in recorded(flights, recordings, crew)}
-        units = [self.units(flight, made) for flight in flights]
-        finished = iter(measure([unit for of_flight in units for unit in of_flight], store, crew))
+            recordings.mkdir(parents=True, exist_ok=True)
+            places = {recordings.absolute() / recording_name(one): one for one in flights}
+        units = [self.units(flight, {path.name: path for path in places}) for flight in flights]
+        all_units = [unit for of_flight in units for unit in of_flight]
+        finished = iter(measure(all_units, store, crew, places))
         return [[next(finished) for _ in of_flight] for of_flight in units]
 
 

@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import Self, TypeVar
 
 import dask
-from distributed import Client, KilledWorker, LocalCluster, Worker, as_completed
+from distributed import Client, Future, KilledWorker, LocalCluster, Worker, as_completed
 from distributed.comm import CommClosedError
 from distributed.security import Security
 
@@ -86,7 +86,8 @@ class Crew:
     ) -> Iterator[tuple[int, Outcome]]:
         """Index and outcome of each task, in the order in which they finish.
 
-        The task of a worker that dies is repeated by another. Other processes import `function`.
+        Tasks that are appended meanwhile are done too, after those before them. The task of a
+        worker that dies is repeated by another. Other processes import `function`.
 
         Raises:
             InputError: The cluster cannot be reached or used.
@@ -95,15 +96,18 @@ class Crew:
         if not tasks:
             return
         client = self._client or self._start()
-        futures = {
-            client.submit(function, task, pure=False, retries=RETRIES): index
-            for index, task in enumerate(tasks)
-        }
+        indices: dict[Future, int] = {}
+        running = as_completed(loop=client.loop, with_results=True)
         try:
-            for future, outcome in as_completed(futures, loop=client.loop, with_results=True):
+            while len(indices) < len(tasks) or not running.is_empty():
+                for task in tasks[len(indices) :]:
+                    future = client.submit(function, task, pure=False, retries=RETRIES)
+                    indices[future] = len(indices)
+                    running.add(future)
+                future, outcome = next(running)
                 if isinstance(outcome, CancelledError):  # the cluster has stopped
                     raise outcome
-                yield futures[future], outcome
+                yield indices[future], outcome
                 future.release()  # frees the outcome in the cluster
         except KilledWorker:
             raise AirgroundError(

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 
 from airground.errors import InputError
 from evaluation.measure.work.code_version import code_version
@@ -17,10 +18,21 @@ from sim.recording.recorder import Flight, record
 
 log = logging.getLogger(__name__)
 
+NO_FLIGHTS: Mapping[Path, Flight] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class ToRecord:
+    """A flight, the path of its recording, and the number of rendering processes."""
+
+    flight: Flight
+    path: Path
+    renderers: int
+
 
 @dataclass(frozen=True)
 class Group:
-    """Units that share their maps, as sent to a worker.
+    """Units that share their maps.
 
     Attributes:
         units: The units; extras are those of the first.
@@ -33,13 +45,7 @@ class Group:
     code: str
 
 
-@dataclass(frozen=True)
-class ToRecord:
-    """A flight, the path of its recording, and the number of rendering processes."""
-
-    flight: Flight
-    path: Path
-    workers: int
+Task = ToRecord | Group
 
 
 @dataclass(frozen=True)
@@ -49,87 +55,144 @@ class Refused:
     reason: str
 
 
-def measure(units: Sequence[Unit], store: UnitStore, crew: Crew) -> list[Finished]:
+def measure(
+    units: Sequence[Unit],
+    store: UnitStore,
+    crew: Crew,
+    flights: Mapping[Path, Flight] = NO_FLIGHTS,
+) -> list[Finished]:
     """Results of all units, in their order; only units missing from the store are measured.
 
-    Each result is stored as soon as it is there. Units that share their maps are one task.
+    Units that share their maps are one task, which begins once their recordings are there: while
+    the last flights are recorded, others are measured. Each result is stored as soon as it is
+    there.
+
+    Args:
+        units: What to measure.
+        store: Units that an earlier run finished; takes those of this one.
+        crew: Processes that do the work.
+        flights: Flights by the path of their recording. Those that are missing are recorded.
 
     Raises:
-        InputError: A unit cannot be measured.
+        InputError: A flight is impossible, a unit cannot be measured, or workers elsewhere do not
+            see the recordings.
         OSError: A result cannot be stored.
     """
-    keys = [unit.key() for unit in units]
-    missing = {key: unit for key, unit in zip(keys, units, strict=True) if key not in store}
-    groups = grouped(missing.values())
-    cores = crew.share(len(groups))
-    sent = [Group(group, cores, code_version()) for group in groups]
-    count = len(set(keys))
-    with step("measuring", count, "units", done=count - len(missing)) as measuring:
-        for index, outcome in crew.outcomes(work, sent):
-            if isinstance(outcome, Refused):
-                raise InputError(outcome.reason)
-            for unit, finished in zip(groups[index], outcome, strict=True):
-                store.write(unit.key(), unit.made_from(), finished)
-            measuring.advance(len(groups[index]))
-    return [store.read(key) for key in keys]
+    left = _Left(units, store, crew, flights)
+    outcomes = crew.outcomes(work, left.tasks)
+    if to_record := len(left.unrecorded):
+        with step("recording", to_record, "flights") as recording:
+            for index, outcome in outcomes:
+                left.finish(index, outcome)
+                recording.move_to(to_record - len(left.unrecorded))
+                if not left.unrecorded:
+                    break
+    with step("measuring", len(units), "units", done=left.done) as measuring:
+        for index, outcome in outcomes:
+            left.finish(index, outcome)
+            measuring.move_to(left.done)
+    return [store.read(unit.key()) for unit in units]
 
 
-def work(group: Group) -> list[Finished] | Refused:
-    """Measure a group; called in a worker."""
-    if code_version() != group.code:
-        return Refused(
-            "a worker has other sources or libraries than this machine; install the same"
-        )
-    try:
-        return measure_units(group.units, group.renderers)
-    except InputError as error:
-        return Refused(str(error))
+class _Left:
+    """What is left to do.
 
-
-def recorded(flights: Sequence[Flight], folder: Path, crew: Crew) -> list[Path]:
-    """Paths of the flights' recordings; those in the folder with the right name are used.
-
-    Raises:
-        InputError: A flight is impossible, or workers elsewhere do not see this folder.
+    Attributes:
+        unrecorded: Flights by the path of their recording, as long as it is not there.
+        tasks: Tasks of the workers; those of further units follow as flights are recorded.
+        done: Number of units whose results are in the store.
     """
-    paths = [folder.absolute() / recording_name(flight) for flight in flights]
-    missing = [pair for pair in zip(flights, paths, strict=True) if not pair[1].exists()]
-    for path in paths:
-        if path.exists():
-            log.info("using the recording %s", path)
-    folder.mkdir(parents=True, exist_ok=True)
-    cores = crew.share(len(missing))
-    with step("recording", len(missing), "flights") as recording:
-        tasks = [ToRecord(flight, path, cores) for flight, path in missing]
-        for _, refused in crew.outcomes(record_flight, tasks):
-            if refused is not None:
-                raise InputError(refused.reason)
-            recording.advance()
-    for path in paths:
-        if not path.exists():
-            raise InputError(f"{path}: workers elsewhere record to another disk; give --render")
-    return paths
+
+    def __init__(
+        self,
+        units: Sequence[Unit],
+        store: UnitStore,
+        crew: Crew,
+        flights: Mapping[Path, Flight],
+    ) -> None:
+        self.unrecorded = {path: one for path, one in flights.items() if not path.exists()}
+        for path in flights:
+            if path not in self.unrecorded:
+                log.info("using the recording %s", path)
+        self.done = 0
+        self._store, self._keys = store, set[str]()
+        self._waiting = grouped(units)
+        ready = self._take_ready()
+        self._renderers = crew.share(len(self.unrecorded) + len(ready))
+        self.tasks: list[Task] = [
+            ToRecord(flight, path, self._renderers) for path, flight in self.unrecorded.items()
+        ]
+        self._add(ready)
+
+    def finish(self, index: int, outcome: list[Finished] | Refused) -> None:
+        """Take in the outcome of a task."""
+        if isinstance(outcome, Refused):
+            raise InputError(outcome.reason)
+        task = self.tasks[index]
+        if isinstance(task, ToRecord):
+            if not task.path.exists():
+                raise InputError(
+                    f"{task.path}: workers elsewhere record to another disk; give --render"
+                )
+            del self.unrecorded[task.path]
+            self._add(self._take_ready())
+        else:
+            for unit, finished in zip(task.units, outcome, strict=True):
+                self._store.write(unit.key(), unit.made_from(), finished)
+            self.done += len(task.units)
+
+    def _take_ready(self) -> list[list[Unit]]:
+        """The missing units of groups whose recordings are there, and which waited until now."""
+        ready = [group for group in self._waiting if self._is_recorded(group)]
+        self._waiting = [group for group in self._waiting if not self._is_recorded(group)]
+        missing = [[unit for unit in group if self._is_missing(unit)] for group in ready]
+        return [group for group in missing if group]
+
+    def _is_recorded(self, group: list[Unit]) -> bool:
+        needed = [place for unit in group for place in (unit.recording, unit.stranger)]
+        return not any(place in self.unrecorded for place in needed if isinstance(place, Path))
+
+    def _is_missing(self, unit: Unit) -> bool:
+        """Whether its results are neither in the store nor under way."""
+        key = unit.key()
+        is_known = key in self._keys or key in self._store
+        self._keys.add(key)
+        self.done += is_known
+        return not is_known
+
+    def _add(self, groups: list[list[Unit]]) -> None:
+        self.tasks += [Group(group, self._renderers, code_version()) for group in groups]
 
 
-def record_flight(task: ToRecord) -> Refused | None:
-    """Record a flight; called in a worker."""
-    flight = task.flight
-    if task.path.exists():  # recorded by a worker that died before it answered
-        return None
+def work(task: Task) -> list[Finished] | Refused:
+    """Do a task; called in a worker. A recording is on the disk, and gives no results."""
     try:
-        record(
-            flight.scene,
-            flight.seed,
-            flight.sensors,
-            task.path,
-            flight.duration_s,
-            workers=task.workers,
-            flight=flight.flight,
-            dials=flight.dials,
-        )
+        if isinstance(task, ToRecord):
+            _record(task)
+            return []
+        if code_version() != task.code:
+            return Refused(
+                "a worker has other sources or libraries than this machine; install the same"
+            )
+        return measure_units(task.units, task.renderers)
     except InputError as error:
         return Refused(str(error))
-    return None
+
+
+def _record(task: ToRecord) -> None:
+    if task.path.exists():  # by a worker that died before it answered
+        return
+    flight = task.flight
+    record(
+        flight.scene,
+        flight.seed,
+        flight.sensors,
+        task.path,
+        flight.duration_s,
+        workers=task.renderers,
+        flight=flight.flight,
+        dials=flight.dials,
+    )
 
 
 def recording_name(flight: Flight) -> str:

@@ -8,6 +8,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import dask
@@ -16,11 +18,23 @@ import pytest
 from airground.errors import AirgroundError, InputError
 from evaluation.measure.work import measure as module
 from evaluation.measure.work.crew import Crew
-from evaluation.measure.work.measure import measure
+from evaluation.measure.work.measure import NO_FLIGHTS, measure
 from evaluation.measure.work.out_folder import LOCK, resumable_folder
 from evaluation.measure.work.unit import Finished, Unit, UnitStore
 from evaluation.table.rows import ResultTable
-from tests.evaluation.measure.fake import DIE, DIE_ONCE, REFUSE, fake_units, runs, work
+from sim.recording.recorder import Flight
+from tests.evaluation.measure.fake import (
+    DIE,
+    DIE_ONCE,
+    REFUSE,
+    fake_flights,
+    fake_units,
+    refused,
+    runs,
+    units_of,
+    waiting_for,
+    work,
+)
 
 DYING = "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
 """What a worker that is killed as it starts runs first."""
@@ -31,12 +45,14 @@ def _fake_work(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "work", work)
 
 
-def measured(units: list[Unit], out: Path, cores: int = 2) -> list[Finished]:
+def measured(
+    units: list[Unit], out: Path, cores: int = 2, flights: Mapping[Path, Flight] = NO_FLIGHTS
+) -> list[Finished]:
     with (
         resumable_folder(out) as folder,
         Crew(None, cores, len(units), folder.scratch) as crew,
     ):
-        return measure(units, folder.store, crew)
+        return measure(units, folder.store, crew, flights)
 
 
 def table_bytes(found: list[Finished], path: Path) -> bytes:
@@ -119,6 +135,43 @@ def test_workers_that_die_as_they_start_are_an_error(
         pytest.raises(AirgroundError, match="the worker processes did not start"),
     ):
         list(crew.outcomes(str, [1]))
+
+
+def test_a_flight_is_measured_while_others_are_recorded(tmp_path: Path) -> None:
+    flights = fake_flights(tmp_path / "flights", 2)
+    first, second = flights
+    tmp_path.joinpath("flights").mkdir()
+    waiting_for(second).write_text(first.name)
+    found = measured(units_of(flights), tmp_path / "out", flights=flights)
+    assert values(found) == [0.05, 0.2, 1.05, 1.2]
+    assert runs(tmp_path / "flights") == [1, 1]
+    # Nothing is recorded or measured again.
+    waiting_for(second).write_text("nothing")
+    assert values(measured(units_of(flights), tmp_path / "out", flights=flights)) == values(found)
+    assert runs(tmp_path / "flights") == [1, 1]
+
+
+def test_a_unit_waits_for_the_recording_of_the_wrong_map(tmp_path: Path) -> None:
+    flights = fake_flights(tmp_path / "flights", 3)
+    _, second, third = flights
+    tmp_path.joinpath("flights").mkdir()
+    waiting_for(second).write_text(third.name)
+    units = units_of(flights)
+    with_wrong_map = replace(units[0], negatives=True, stranger=second)
+    found = measured([with_wrong_map, units[4]], tmp_path / "out", flights=flights)
+    assert values(found) == [0.05, 2.05]
+
+
+def test_a_refused_flight_ends_the_run(tmp_path: Path) -> None:
+    flights = fake_flights(tmp_path / "flights", 2)
+    first, second = flights
+    tmp_path.joinpath("flights").mkdir()
+    refused(second).touch()
+    with pytest.raises(InputError, match="flight_1 is impossible"):
+        measured(units_of(flights), tmp_path / "out", 1, flights)
+    assert first.exists()
+    refused(second).unlink()
+    assert len(measured(units_of(flights), tmp_path / "out", 1, flights)) == 4
 
 
 def test_a_refused_unit_ends_the_run_and_finished_units_stay(

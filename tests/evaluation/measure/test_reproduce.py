@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -23,6 +23,7 @@ from evaluation.measure.work.unit import Finished, Unit, UnitStore
 from evaluation.setup import published
 from evaluation.setup.setups import Setup, with_companions
 from evaluation.table.rows import UNSCORED_SCENES, ResultTable, Row
+from sim.recording.recorder import Flight
 from sim.scene import load_scene
 from sim.sensors.presets import NOMINAL
 
@@ -40,7 +41,9 @@ def flown_for(
     """(scene, seed, flight) of what is flown for so many sequences, and how many those give."""
     flown: list[tuple[str, int, int]] = []
 
-    def measure(units: Sequence[Unit], store: UnitStore, crew: Crew) -> list[Finished]:
+    def measure(
+        units: Sequence[Unit], store: UnitStore, crew: Crew, flights: Mapping[Path, Flight]
+    ) -> list[Finished]:
         finished = []
         for unit in units:
             scene = unit.recording.scene.name  # type: ignore[union-attr]
