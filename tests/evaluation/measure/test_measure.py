@@ -39,6 +39,18 @@ from tests.evaluation.measure.fake import (
 DYING = "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
 """What a worker that is killed as it starts runs first."""
 
+ABOUT_WORKERS = pytest.mark.subject(
+    "evaluation/measure/work",
+    "evaluation/setup",
+    "evaluation/table",
+    "airground/errors.py",
+    but={
+        "airground/config.py": "units are made up",
+        "evaluation/measure/protocol": "likewise",
+        "sim": "flights are named and not flown",
+    },
+)
+
 
 @pytest.fixture(autouse=True)
 def _fake_work(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -78,13 +90,7 @@ def test_a_flight_is_measured_once_for_all_its_variants(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.subject(
-    "evaluation/measure/work",
-    "evaluation/setup",
-    "evaluation/table",
-    "airground/errors.py",
-    but={"airground/config.py": "units are made up", "evaluation/measure/protocol": "likewise"},
-)
+@ABOUT_WORKERS
 def test_results_do_not_depend_on_the_number_of_workers(tmp_path: Path) -> None:
     units = fake_units(tmp_path / "flights", 5)
     made = {
@@ -102,13 +108,7 @@ def test_results_do_not_depend_on_the_number_of_workers(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.subject(
-    "evaluation/measure/work",
-    "evaluation/setup",
-    "evaluation/table",
-    "airground/errors.py",
-    but={"airground/config.py": "units are made up", "evaluation/measure/protocol": "likewise"},
-)
+@ABOUT_WORKERS
 def test_a_task_that_kills_every_worker_is_an_error(tmp_path: Path) -> None:
     units = fake_units(tmp_path / "flights", 1)
     (tmp_path / "flights/flight_0" / DIE).touch()
@@ -119,13 +119,7 @@ def test_a_task_that_kills_every_worker_is_an_error(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.subject(
-    "evaluation/measure/work",
-    "evaluation/setup",
-    "evaluation/table",
-    "airground/errors.py",
-    but={"airground/config.py": "units are made up", "evaluation/measure/protocol": "likewise"},
-)
+@ABOUT_WORKERS
 def test_workers_that_die_as_they_start_are_an_error(
     tmp_path: Path,
 ) -> None:
@@ -224,13 +218,7 @@ def test_a_full_disk_leaves_complete_units_only(
 
 
 @pytest.mark.slow(minutes=1)
-@pytest.mark.subject(
-    "evaluation/measure/work",
-    "evaluation/setup",
-    "evaluation/table",
-    "airground/errors.py",
-    but={"airground/config.py": "units are made up", "evaluation/measure/protocol": "likewise"},
-)
+@ABOUT_WORKERS
 def test_a_killed_run_is_continued(tmp_path: Path) -> None:
     out, flights = tmp_path / "out", tmp_path / "flights"
     command = [sys.executable, "-m", "tests.evaluation.measure.killed_run"]
