@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pytest
@@ -23,6 +23,7 @@ from evaluation.measure.work.unit import Finished, Unit, UnitStore
 from evaluation.setup.setups import Setup
 from evaluation.table.comparison import least_paired_p
 from evaluation.table.rows import CONTROL_SCENES, ResultTable, Row
+from sim.recording.recorder import Flight
 from sim.scene import load_scene
 from sim.sensors.presets import NONE, sensor_preset
 from tests.evaluation.judge.flights import CONDITION
@@ -39,7 +40,9 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Unit]:
     """What would have been measured."""
     seen: list[Unit] = []
 
-    def measure(units: Sequence[Unit], store: UnitStore, crew: Crew) -> list[Finished]:
+    def measure(
+        units: Sequence[Unit], store: UnitStore, crew: Crew, flights: Mapping[Path, Flight]
+    ) -> list[Finished]:
         seen.extend(units)
         rows = [Row("tiny", u.seed, 0, CONDITION, "run", "recorded_s", 20.0, "s") for u in units]
         return [Finished(ResultTable.from_rows([row]), None) for row in rows]
