@@ -50,7 +50,7 @@ def units_of(flights: dict[Path, Flight]) -> list[Unit]:
 
 def make_recording(path: Path, pause_s: float = 0.0) -> None:
     path.mkdir(parents=True, exist_ok=True)
-    (path / "recording.toml").write_text(f"seed = {path.name}\n")
+    (path / "recording.toml").write_text(f'name = "{path.name}"\n')
     (path / PAUSE_S).write_text(str(pause_s))
 
 
