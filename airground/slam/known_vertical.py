@@ -5,15 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from airground.core.arrays import F64
+from airground.core.messages import ImuNoise
 from airground.slam.inertial.preintegration import GRAVITY
 
-BIAS_MPS2 = 0.05
-"""Standard deviation of the accelerometer's bias per axis [m/s^2]."""
+BIAS_OF_DENSITY = 25.0
+"""The bias of an accelerometer is about so many times its noise density [1/sqrt(s)]: 0.05 m/s^2 in
+an ADIS16448, 0.1 m/s^2 in an MPU-6000. Calibrations state the density alone."""
 READING_MPS2 = 0.01
-"""Standard deviation of a second's reading per axis, the motion that images show taken off
-[m/s^2]."""
-LEVEL_SIGMA = BIAS_MPS2 / GRAVITY
-"""Standard deviation of the vertical at rest per axis [rad]."""
+"""Standard deviation of a second's reading per axis beside its noise, as images show the motion
+that is taken off [m/s^2]."""
+FIRST_READING_S = 0.2
+"""The reading that makes a map level is the mean over so long."""
+ASSUMED_SIGMA = 0.05 / GRAVITY
+"""Standard deviation of the vertical per axis [rad] of a robot that is taken to stand level."""
 
 
 class KnownVertical:
@@ -21,31 +25,48 @@ class KnownVertical:
 
     A robot that never turns cannot tell the accelerometer's bias from a map that leans. As it
     turns, the bias turns with it and the vertical stays, so that readings tell them apart. That is
-    linear in the two angles by which the map leans and the three values of the bias; the rest of
-    what the robot does is taken as known.
+    linear in the two angles by which the map leans and the three values of the bias, which walks;
+    the rest of what the robot does is taken as known. A Kalman filter holds their covariance.
+
+    Args:
+        noise: Of the accelerometer; None without one.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, noise: ImuNoise | None) -> None:
+        self._noise = noise
         self._stamp_ns: int | None = None
-        self._seconds = 0.0
-        self._turned = np.zeros((2, 3))
+        bias = 0.0 if noise is None else BIAS_OF_DENSITY * noise.accelerometer_noise_density
+        # Of gravity along x and y of the map, as far as it leans, and of the bias [m^2/s^4].
+        self._covariance = np.diag([GRAVITY**2] * 2 + [bias**2] * 3)
+        self.sigma_at_start = self.sigma = ASSUMED_SIGMA
 
-    def sigma(self, stamp_ns: int, R_map_imu: F64) -> float:
-        """Standard deviation of the vertical per axis [rad], after one more image.
+    def read(self, stamp_ns: int, R_map_imu: F64) -> None:
+        """Take in the reading of one more image; the first one makes the map level.
 
         Args:
-            stamp_ns: Stamp of the image; the first one begins.
+            stamp_ns: Stamp of the image.
             R_map_imu: (3, 3) rotation of the accelerometer at that time.
         """
+        if self._noise is None:
+            return
+        seconds = FIRST_READING_S
         if self._stamp_ns is not None:
             seconds = (stamp_ns - self._stamp_ns) * 1e-9
-            self._seconds += seconds
-            self._turned += R_map_imu[:2] * seconds
+            walked = self._noise.accelerometer_bias_walk**2 * seconds
+            self._covariance[2:, 2:] += walked * np.eye(3)
+        of_a_second = READING_MPS2**2 + self._noise.accelerometer_noise_density**2
+        self._update(R_map_imu, of_a_second / seconds)
+        self.sigma = float(np.sqrt(np.trace(self._covariance[:2, :2]) / 2)) / GRAVITY
+        if self._stamp_ns is None:
+            self.sigma_at_start = self.sigma
         self._stamp_ns = stamp_ns
-        # What readings say of the angles, in seconds of reading, once the bias has had its share.
-        prior_s = (READING_MPS2 / BIAS_MPS2) ** 2
-        share = self._turned @ self._turned.T / (self._seconds + prior_s)
-        known_s = np.linalg.eigvalsh(self._seconds * np.eye(2) - share)
-        # The first reading made the map level: it leans by no more than the bias.
-        known_s = np.maximum(known_s, prior_s)
-        return float(READING_MPS2 / GRAVITY * np.sqrt((1 / known_s).mean()))
+
+    def _update(self, R_map_imu: F64, variance: float) -> None:
+        """A reading of x and y of the map, with the variance of each [m^2/s^4]."""
+        reading = np.hstack([np.eye(2), R_map_imu[:2]])
+        before = self._covariance
+        gain = np.linalg.solve(
+            reading @ before @ reading.T + variance * np.eye(2), reading @ before
+        ).T
+        kept = np.eye(5) - gain @ reading
+        self._covariance = kept @ before @ kept.T + variance * gain @ gain.T

@@ -92,8 +92,8 @@ class MapAdjuster:
     def whole_map(self, inertial: bool) -> MapProblem:
         """The whole map as it is, to be adjusted with the settings `GLOBAL`.
 
-        With an IMU, place and heading of the newest keyframe stay, so that a better vertical
-        turns the past about the robot instead of moving the robot about the past. Without,
+        With an IMU, place and heading of the newest keyframe's camera stay, so that a better
+        vertical turns the past about it instead of moving it about the past. Without,
         the first keyframe stays, since only there it is known where up is. Keyframes that
         culling left without their inertial motion stay in either case.
         """
@@ -159,6 +159,7 @@ class MapAdjuster:
         self, chosen: list[int], roles: I64, inertial: bool, settings: Settings
     ) -> F64 | None:
         problem = self._problem(chosen, roles, inertial)
+        place = self.place_that_stays(problem)
         result = adjust(*problem.parts(), self.camera, self.T_rig_camera, settings)
         states = result.states
         for n, keyframe in enumerate(problem.keyframes):
@@ -171,8 +172,24 @@ class MapAdjuster:
                 states.accelerometer_biases[n] if inertial else before.accelerometer_bias,
             )
         self.map.positions[problem.points] = result.points
+        self.keep_place(problem, place)
         problem.drop_misfits(self.map, result.residuals_px, self.parameters.corner_sigma_px)
         return result.covariance
+
+    def place_that_stays(self, problem: MapProblem) -> F64 | None:
+        """(3,) where the camera of the keyframe without a free place is [m], before adjustment;
+        None where others hold the map."""
+        if Role.GAUGE not in problem.roles:
+            return None
+        keyframe = problem.keyframes[int(np.argmax(problem.roles == Role.GAUGE))]
+        return (keyframe.state.pose() @ self.T_rig_camera).translation
+
+    def keep_place(self, problem: MapProblem, place: F64 | None) -> None:
+        """Shift the adjusted map so that this camera is where it was: adjustment holds the IMU,
+        about which a better vertical turns the camera."""
+        now = self.place_that_stays(problem)
+        if place is not None and now is not None:
+            self.map.shift(place - now)
 
     def _problem(self, chosen: list[int], roles: I64, inertial: bool) -> MapProblem:
         moving = [k for k, role in zip(chosen, roles, strict=True) if role != Role.FIXED]

@@ -12,7 +12,7 @@ from airground.core.trajectory import Trajectory
 from airground.slam.frame import Frame, require_order
 from airground.slam.front_end import TrackedPose, Tracking
 from airground.slam.keyframe_slam import KeyframeSlam
-from airground.slam.known_vertical import LEVEL_SIGMA, KnownVertical
+from airground.slam.known_vertical import KnownVertical
 from airground.slam.stale_images import StaleImages
 from airground.slam.starts import StandStill, level_start
 
@@ -42,7 +42,7 @@ class RgbdSlam:
         )
         self._slam.metric = True
         self._standing = StandStill(calibration)
-        self._vertical = KnownVertical()
+        self._vertical = KnownVertical(calibration.imu)
         self._most_points = 0
         self._images = StaleImages(self._slam)
         self._last_ns: int | None = None
@@ -70,9 +70,8 @@ class RgbdSlam:
                 slam.stand_still(frame, rest)
                 corrected = True
         slam.note(image.stamp_ns)
-        level_sigma = LEVEL_SIGMA
-        if slam.inertial:
-            level_sigma = self._vertical.sigma(image.stamp_ns, slam.state.rotation)
+        self._vertical.read(image.stamp_ns, slam.state.rotation)
+        level_sigma = self._vertical.sigma if slam.inertial else self._vertical.sigma_at_start
         return TrackedPose(
             image.stamp_ns,
             Tracking.TRACKED,
@@ -108,4 +107,5 @@ class RgbdSlam:
             return TrackedPose(frame.stamp_ns, Tracking.INITIALIZING, None, waiting=waiting)
         slam.published = slam.settled = True
         slam.note(frame.stamp_ns)
+        self._vertical.read(frame.stamp_ns, slam.state.rotation)
         return TrackedPose(frame.stamp_ns, Tracking.TRACKED, slam.T_map_camera())

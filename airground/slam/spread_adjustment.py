@@ -107,6 +107,7 @@ class SpreadAdjustment:
 
     def _move_map(self, result: Adjustment) -> None:
         problem, sparse_map, adjuster = self._problem, self._map, self._adjuster
+        place = adjuster.place_that_stays(problem)
         lever = adjuster.T_rig_camera.translation
         changes = _changes(problem.states, result.states, self._inertial)
         taking_part = dict(zip(map(id, problem.keyframes), changes, strict=True))
@@ -122,6 +123,7 @@ class SpreadAdjustment:
             ids = others[origins == k]
             positions[ids] = now[k].of_points(positions[ids])
         positions[problem.points] += result.points - problem.positions
+        adjuster.keep_place(problem, place)
         sigma_px = adjuster.parameters.corner_sigma_px
         problem.drop_misfits(sparse_map, result.residuals_px, sigma_px)
         adjuster.settle(problem.keyframes[-1])
