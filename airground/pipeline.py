@@ -58,6 +58,7 @@ class Mapping:
             Source.GROUND: StraightImages(ground),
         }
         self.ground_map: GroundMap | FixedMap = GroundMap(ground.camera, config.ground_mapping)
+        self._ground_scale_sigma = ground.sigmas.depth_scale
         self._poses: dict[Source, TrackedPose] = {}
         self._max_scale_sigma = config.view_selection.max_scale_sigma
         self._scaled = False
@@ -135,6 +136,7 @@ class Mapping:
             self.relative_heading(),
             mav.covariance,
             ground.covariance,
+            self._ground_scale_sigma,
         )
 
 
@@ -238,7 +240,8 @@ def pair_of(sighting: Sighting, config: Config) -> HeightMapPair:
 
 
 def pose_errors_of(sighting: Sighting) -> PoseErrors:
-    """How well SLAM knew both robots' poses when a surface was finished."""
+    """How well both robots' poses, and the ground map's scale, were known when a surface was
+    finished."""
     surface = sighting.surface
     # Column by column: ten times as fast as one mean over the first axis.
     middle = [column.mean(dtype=np.float64) for column in surface.cloud_mav.points.T]
@@ -246,6 +249,8 @@ def pose_errors_of(sighting: Sighting) -> PoseErrors:
         surface.T_mav_camera.translation - middle,
         _turns(sighting.covariance_mav),
         _turns(sighting.covariance_ground),
+        sighting.T_ground_camera.translation,
+        sighting.ground_scale_sigma,
     )
 
 

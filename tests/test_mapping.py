@@ -21,6 +21,7 @@ from airground.core.events import (
     TrackingLost,
 )
 from airground.core.messages import (
+    CalibrationSigmas,
     GroundImage,
     ImuSamples,
     MavImage,
@@ -38,6 +39,8 @@ from airground.tracking import FrontEnds, TrackedFrame, Trackers
 
 CAMERA = PinholeCamera(160, 120, 130.0, 130.0, 79.5, 59.5)
 CALIBRATION = RobotCalibration(CAMERA, SE3.identity(), SE3.identity())
+DEPTH_SCALE_SIGMA = 0.02
+OF_GROUND = replace(CALIBRATION, sigmas=CalibrationSigmas(depth_scale=DEPTH_SCALE_SIGMA))
 CONFIG = Config(ground_mapping=GroundMapping(min_keyframes=1))
 COVARIANCE = np.diag([1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6])
 
@@ -92,8 +95,8 @@ class Fed:
     """Both trackers and the maps above them, fed message by message."""
 
     def __init__(self, mav: Scripted, ground: Scripted) -> None:
-        self.trackers = Trackers(CALIBRATION, CALIBRATION, FrontEnds(mav, ground))
-        self.mapping = Mapping(CONFIG, CALIBRATION, CALIBRATION)
+        self.trackers = Trackers(CALIBRATION, OF_GROUND, FrontEnds(mav, ground))
+        self.mapping = Mapping(CONFIG, CALIBRATION, OF_GROUND)
 
     def add(self, stamped: Stamped) -> list[Event]:
         (frame,) = self.trackers.frames([stamped])
@@ -216,6 +219,8 @@ def test_a_sighting_has_both_poses_and_how_sure_slam_was_of_them() -> None:
     np.testing.assert_array_equal(errors.turns_mav, COVARIANCE[3:, 3:])
     np.testing.assert_array_equal(errors.turns_ground, 4 * COVARIANCE[3:, 3:])
     np.testing.assert_allclose(errors.lever_mav, [0.1, 0.0, 0.0])
+    np.testing.assert_array_equal(errors.ground_robot, sighting.T_ground_camera.translation)
+    assert errors.ground_scale == DEPTH_SCALE_SIGMA
 
 
 def test_what_the_front_ends_put_off_reaches_the_map_at_the_end() -> None:

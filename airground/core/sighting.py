@@ -22,6 +22,7 @@ class Sighting:
         heading: Turn of `mav` in `ground` by the magnetometers [rad], None if unknown.
         covariance_mav, covariance_ground: (6, 6) covariances of these poses: position [m] and
             rotation [rad], in the axes of `mav` and of `ground`; None where SLAM states none.
+        ground_scale_sigma: Relative standard deviation of distances in the ground robot's map.
     """
 
     surface: AerialSurface
@@ -33,3 +34,4 @@ class Sighting:
     heading: float | None
     covariance_mav: F64 | None = None
     covariance_ground: F64 | None = None
+    ground_scale_sigma: float = 0.0

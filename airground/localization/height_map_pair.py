@@ -34,7 +34,7 @@ class HeightMapPair:
         ground_robot_position: (2,) centre of the search region in `ground` [m].
         heading: Turn of `mav` in `ground` [rad]; not used where it is searched.
         config: The pipeline's parameters; height maps and localization are used.
-        pose_errors: How well both robots' poses are known.
+        pose_errors: How well both robots' poses, and the ground map's scale, are known.
         newest: The pair of the newest surface alone; None where the surface is that one.
     """
 

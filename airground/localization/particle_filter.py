@@ -128,7 +128,7 @@ class MonteCarloLocalizer:
             stamp_ns=pair.stamp_ns,
             particles=particles,
             estimate=estimate,
-            covariance=np.cov(particles[:, :2].T) + pair.pose_errors.covariance(estimate[2]),
+            covariance=np.cov(particles[:, :2].T) + pair.pose_errors.covariance(estimate),
             cost=float(pair.costs_as_posed(estimate[None])[0]),
             height_offset=offset,
             T_ground_mav=motion_at(estimate, pair.position_mav, offset),
