@@ -21,6 +21,8 @@ ERROR_STAGE = "trajectory_error"
 SLAM_STAGE = {"mav": "mono_slam", "ground": "rgbd_slam"}
 DRAWN_EVERY_NS = 100_000_000
 """Errors over time are kept this far apart."""
+BEGINNING_NS = 1_000_000_000
+"""Poses of this time from the first one on say where a map begins."""
 
 
 def add_tracking(out: RowWriter, tracked: Tracked, true_pose: Callable[[int], SE3]) -> None:
@@ -101,32 +103,38 @@ def consistency(
     answers: Sequence[TrackedPose], true_pose: Callable[[int], SE3]
 ) -> tuple[Consistency, Consistency]:
     """Consistency of the live position (3 degrees of freedom) and of the live pose (6). A map is
-    free in its origin and heading only, so the truth is aligned by those four over all images:
-    scale error and tilt count as errors. Images without a usable covariance are left out."""
+    free in its origin and heading only, where it begins, so the truth is aligned by those four over
+    its first second: drift, scale error and tilt count as errors. Images without a usable
+    covariance are left out."""
     known = [
-        (answer.T_map_camera, true_pose(answer.stamp_ns), answer.covariance)
+        (answer.stamp_ns, answer.T_map_camera, true_pose(answer.stamp_ns), answer.covariance)
         for answer in answers
         if answer.T_map_camera is not None and answer.covariance is not None
     ]
-    known = [entry for entry in known if _usable(entry[2])]
+    known = [entry for entry in known if _usable(entry[3])]
     if len(known) < MIN_POSES:
         nothing = Consistency(float("nan"), float("nan"))
         return nothing, nothing
-    estimates, truths, covariances = zip(*known, strict=True)
-    T_map_world = level_alignment(estimates, truths)
+    stamps, estimates, truths, covariances = zip(*known, strict=True)
+    first = int(np.searchsorted(stamps, stamps[0] + BEGINNING_NS))
+    T_map_world = level_alignment(estimates[:first], truths[:first])
     errors = np.array([_error(e, T_map_world @ t) for e, t in zip(estimates, truths, strict=True)])
     covariance = np.array(covariances)
     return _normalized(errors[:, :3], covariance[:, :3, :3]), _normalized(errors, covariance)
 
 
 def level_alignment(estimates: Sequence[SE3], truths: Sequence[SE3]) -> SE3:
-    """`T_map_world` by shift and heading alone that brings the true positions closest."""
-    here = np.array([pose.translation for pose in estimates])
-    there = np.array([pose.translation for pose in truths])
-    a, b = here - here.mean(axis=0), there - there.mean(axis=0)
-    heading = np.arctan2((b[:, 0] * a[:, 1] - b[:, 1] * a[:, 0]).sum(), (b[:, :2] * a[:, :2]).sum())
+    """`T_map_world` by shift and heading alone: the mean ones of these poses."""
+    turns = np.array(
+        [here.rotation @ there.rotation.T for here, there in zip(estimates, truths, strict=True)]
+    )
+    heading = np.arctan2(
+        (turns[:, 1, 0] - turns[:, 0, 1]).sum(), (turns[:, 0, 0] + turns[:, 1, 1]).sum()
+    )
     turn = SE3.from_heading(float(heading))
-    return SE3.from_heading(float(heading), here.mean(axis=0) - turn @ there.mean(axis=0))
+    here = np.mean([pose.translation for pose in estimates], axis=0)
+    there = np.mean([pose.translation for pose in truths], axis=0)
+    return SE3.from_heading(float(heading), here - turn @ there)
 
 
 def _usable(covariance: NDArray[np.float64]) -> bool:

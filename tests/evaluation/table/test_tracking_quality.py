@@ -122,6 +122,26 @@ def test_overconfidence_shows() -> None:
     assert pose.within_95 < 0.5
 
 
+def test_a_drift_counts_from_where_the_map_begins() -> None:
+    """A scale that is off by as much as the covariance says, over a straight path after a second at
+    rest: one of three (of six) directions has an error of one standard deviation."""
+
+    def straight(stamp_ns: int, scale: float = 1.0) -> SE3:
+        moved_s = max(stamp_ns * 1e-9 - 1.0, 0.0)
+        return SE3.from_heading(0.3, [scale * 0.2 * moved_s, 0.0, 0.5])
+
+    answers = []
+    for stamp_ns in range(0, 400 * STEP_NS, STEP_NS):
+        along = 0.02 * straight(stamp_ns).translation[0]
+        covariance = np.diag([along**2, 0.0, 0.0, 0.0, 0.0, 0.0]) + 1e-6 * np.eye(6)
+        pose = T_MAP_WORLD @ straight(stamp_ns, 1.02)
+        turn = np.kron(np.eye(2), T_MAP_WORLD.rotation)
+        answers.append(TrackedPose(stamp_ns, Tracking.TRACKED, pose, turn @ covariance @ turn.T))
+    position, pose_ = consistency(answers, straight)
+    assert position.nees == pytest.approx(1 / 3, rel=0.1)
+    assert pose_.nees == pytest.approx(1 / 6, rel=0.1)
+
+
 def test_without_covariance_nothing_is_claimed() -> None:
     answers = [TrackedPose(0, Tracking.TRACKED, true_pose(0))] * 5
     position, pose = consistency(answers, true_pose)
