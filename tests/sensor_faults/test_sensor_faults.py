@@ -21,7 +21,7 @@ from sim.sensors.faults import Fault, FaultKind
 from sim.sensors.presets import NOMINAL
 from sim.sensors.robot_clock import RobotClock
 from tests.sensor_faults.__main__ import SCENE, SEED
-from tests.sensor_faults.case import Outcome, drawn, judged, outcome, outcome_in, unseen
+from tests.sensor_faults.case import AFTER_S, Outcome, drawn, judged, outcome, outcome_in, unseen
 
 STEP_NS = 33_333_333
 START, END = 10, 20
@@ -121,8 +121,8 @@ def test_a_robot_that_stays_lost_never_comes_again() -> None:
 RECORDED_S = 23.0
 BEGIN_S: dict[Robot, float] = {"mav": 11.0, "ground": 8.0}
 """Start of a fault [s]: the MAV's map has settled; the ground robot turns in mapped views."""
-TURNING_S = 15.6
-"""Start of 5 s in which the ground robot turns through views that are new to one that its map has
+TURNING_S = 15.4, 15.6, 15.8
+"""Starts of 5 s in which the ground robot turns through views that are new to one that its map has
 [s]."""
 OFF_M, OFF_DEG = 0.03, 1.0
 """What the error of a pose may grow by through a fault; it is 1.6 cm at most in the table of
@@ -136,12 +136,12 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     return Recording.open(path)
 
 
-def assert_no_harm(found: Outcome) -> None:
-    """No silent jump, no pose from an image that shows nothing new, and back within a second."""
+def assert_no_harm(found: Outcome, back_s: float = 1.0) -> None:
+    """No silent jump, no pose from an image that shows nothing new, and back in that time [s]."""
     assert not found.error
     assert found.silent_s == 0.0
     assert found.blind == 0
-    assert found.again_s < 1.0
+    assert found.again_s < back_s
     assert found.off_m < OFF_M
     assert found.off_deg < OFF_DEG
 
@@ -193,19 +193,24 @@ def test_two_gaps_of_the_imu_step_by_a_centimetre_at_most(
     assert found.step_m < 0.01
 
 
-@pytest.mark.slow
+@pytest.mark.slow(minutes=3)
 @pytest.mark.parametrize("robot", ["mav", "ground"])
 def test_after_five_seconds_in_the_dark_the_map_is_found_again(
     recording: Recording, robot: Robot
 ) -> None:
-    """The ground robot turns by more than 120 deg in these seconds."""
-    dark = Fault("black", robot, 5.0, TURNING_S)
-    if robot == "ground":
-        assert turned_deg(Truth.open(recording.path), dark, dark.end_ns) > 120
-    found = outcome_in(recording, [dark])
-    assert_no_harm(found)
-    assert found.lost >= 150
-    assert found.step_m < 0.01
+    """The ground robot turns by more than 120 deg in these seconds. What it sees when the light is
+    back decides how soon it is: within a second at most moments."""
+    again_s = []
+    for start_s in TURNING_S:
+        dark = Fault("black", robot, 5.0, start_s)
+        if robot == "ground":
+            assert turned_deg(Truth.open(recording.path), dark, dark.end_ns) > 120
+        found = outcome_in(recording, [dark])
+        assert_no_harm(found, AFTER_S)
+        assert found.lost >= 150
+        assert found.step_m < 0.01
+        again_s.append(found.again_s)
+    assert np.median(again_s) < 1.0
 
 
 @pytest.mark.slow(minutes=1)
