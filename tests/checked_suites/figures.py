@@ -1,4 +1,4 @@
-"""The figures of suites that passed whole, and the version of the code that gave them."""
+"""The figures of suites that passed whole, and the code and the machine that gave them."""
 
 from __future__ import annotations
 
@@ -18,14 +18,16 @@ from evaluation.setup.checked_json import Part, read_checked
 from evaluation.setup.console import EXIT_OK, EXIT_WORSE
 from evaluation.setup.output import write_whole
 from evaluation.show.comparison.verdict_table import print_comparison
+from tests.machine import machine
 
 FILE = Path(__file__).with_name("figures.json")
 
 
 class Checked(Part):
-    """The version of the code, and the figures of each suite with it."""
+    """The version of the code, the machine (`tests.machine`), and the figures of each suite."""
 
     code: str
+    machine: str
     suites: dict[SuiteName, Accepted]
 
     @classmethod
@@ -50,7 +52,7 @@ def keep(results: Path, path: Path = FILE) -> int:
         revision = Summary.read(results / name / SUMMARY).git_revision
         today = datetime.now(UTC).date()
         suites[name] = Accepted.of(measured, revision, "passed whole", None, today)
-    Checked(code=code_version(), suites=suites).write(path)
+    Checked(code=code_version(), machine=machine(), suites=suites).write(path)
     return EXIT_OK
 
 

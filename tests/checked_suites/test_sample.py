@@ -86,6 +86,22 @@ def test_other_results_of_the_same_sources_are_named(
     assert sample(results, results / "checked.json") == EXIT_OK
 
 
+def test_on_another_machine_other_digits_pass_and_a_fault_does_not(
+    results: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = results / "checked.json"
+    keep(results, file)
+    frame = TABLE.frame.copy()
+    frame.loc[frame["metric"] == "mav_ate_se3_rmse_m", "value"] *= 1.001
+    sampled_as(monkeypatch, 2, ResultTable(frame))
+    assert sample(results, file) == EXIT_RUN_WHOLE
+    monkeypatch.setattr(sampling, "machine", lambda: "another")
+    assert sample(results, file) == EXIT_OK
+    sampled_as(monkeypatch, 2, WORSE)
+    assert sample(results, file) == EXIT_RUN_WHOLE
+    assert "suite fast: tiny/2/0 gave worse results" in capsys.readouterr().out
+
+
 def test_figures_are_held_against_what_is_accepted_now(
     results: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -100,7 +116,7 @@ def test_figures_are_held_against_what_is_accepted_now(
 def test_other_sources_are_not_sampled(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    Checked(code="0", suites={}).write(tmp_path / "checked.json")
+    Checked(code="0", machine="0", suites={}).write(tmp_path / "checked.json")
     monkeypatch.delattr(sampling, "measured_sample")
     assert sample(tmp_path, tmp_path / "checked.json") == EXIT_RUN_WHOLE
     assert "sources that make results changed" in capsys.readouterr().out
