@@ -203,6 +203,22 @@ def test_the_pictures_of_measured_levels_are_those_of_the_runs_kept(tmp_path: Pa
         assert off is None, f"runs have changed: run docs/measured_levels.py, or make docs\n{off}"
 
 
+def test_the_levels_in_the_readme_are_those_of_their_page() -> None:
+    page = (ROOT / "docs" / "measured_levels.md").read_text(encoding="utf-8")
+    methods = page[page.index("| best guess within 0.25 m") : page.index("## `paper` 1")]
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(\w+)` (\d) \| (.*) \| (\d+ of \d+) \|$", readme, re.MULTILINE)
+    assert rows
+    for level, version, shares, claims in rows:
+        level_on = page[page.index(f"## `{level}` {version}") :]
+        together = re.search(r"^\| all together \|.*", level_on, re.MULTILINE)
+        assert together is not None
+        assert f"({claims};" in together.group(), f"{level}: {claims}"
+        for share in shares.split(" | "):
+            count, interval = share.rstrip(")").split(" (")
+            assert f"({count}; {interval})" in methods, f"{level}: {share}"
+
+
 def test_every_row_of_the_parameters_stands_alone() -> None:
     page = (ROOT / "docs" / "parameters.md").read_text(encoding="utf-8")
     rows = [line for line in page.splitlines() if line.startswith("| `")]
