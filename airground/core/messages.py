@@ -85,6 +85,11 @@ class MagneticSamples:
         return MagneticSamples(self.stamps_ns[lo:hi], self.field[lo:hi])
 
 
+BIAS_OF_DENSITY = 25.0
+"""The bias of an accelerometer is about so many times its noise density [1/sqrt(s)]: 0.05 m/s^2 in
+an ADIS16448, 0.1 m/s^2 in an MPU-6000. Calibrations state the density alone."""
+
+
 @dataclass(frozen=True)
 class ImuNoise:
     """Noise of an inertial sensor by its data sheet.
@@ -100,6 +105,11 @@ class ImuNoise:
     gyro_bias_walk: float
     accelerometer_noise_density: float
     accelerometer_bias_walk: float
+
+    @property
+    def accelerometer_bias_sigma(self) -> float:
+        """Standard deviation of the accelerometer's bias per axis at the start [m/s^2]."""
+        return BIAS_OF_DENSITY * self.accelerometer_noise_density
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,6 @@ from airground.core.arrays import F64
 from airground.core.messages import ImuNoise
 from airground.slam.inertial.preintegration import GRAVITY
 
-BIAS_OF_DENSITY = 25.0
-"""The bias of an accelerometer is about so many times its noise density [1/sqrt(s)]: 0.05 m/s^2 in
-an ADIS16448, 0.1 m/s^2 in an MPU-6000. Calibrations state the density alone."""
 READING_MPS2 = 0.01
 """Standard deviation of a second's reading per axis beside its noise, as images show the motion
 that is taken off [m/s^2]."""
@@ -35,7 +32,7 @@ class KnownVertical:
     def __init__(self, noise: ImuNoise | None) -> None:
         self._noise = noise
         self._stamp_ns: int | None = None
-        bias = 0.0 if noise is None else BIAS_OF_DENSITY * noise.accelerometer_noise_density
+        bias = 0.0 if noise is None else noise.accelerometer_bias_sigma
         # Of gravity along x and y of the map, as far as it leans, and of the bias [m^2/s^4].
         self._covariance = np.diag([GRAVITY**2] * 2 + [bias**2] * 3)
         self.sigma_at_start = self.sigma = ASSUMED_SIGMA

@@ -177,8 +177,8 @@ class MapAdjuster:
         return result.covariance
 
     def place_that_stays(self, problem: MapProblem) -> F64 | None:
-        """(3,) where the camera of the keyframe without a free place is [m], before adjustment;
-        None where others hold the map."""
+        """(3,) where the camera of the keyframe without a free place is now [m]; None where others
+        hold the map."""
         if Role.GAUGE not in problem.roles:
             return None
         keyframe = problem.keyframes[int(np.argmax(problem.roles == Role.GAUGE))]

@@ -6,6 +6,7 @@ import numpy as np
 
 from airground.slam.front_end import ScaleEstimate
 from airground.slam.inertial.alignment import (
+    ACCELEROMETER_BIAS_SIGMA,
     HOPELESS_SIGMA,
     OBSERVABLE_SIGMA,
     InertialAlignment,
@@ -13,7 +14,7 @@ from airground.slam.inertial.alignment import (
     align,
     refine_scale,
 )
-from airground.slam.inertial.preintegration import Preintegration
+from airground.slam.inertial.preintegration import GRAVITY, Preintegration
 from airground.slam.keyframe_slam import KeyframeSlam
 
 MIN_KEYFRAMES = 6
@@ -33,9 +34,9 @@ SETTLED_SIGMA = 0.02
 """The scale counts as known from this standard deviation on [share] ..."""
 SETTLED_TILT = np.deg2rad(0.5)
 """... and the vertical from this one on [rad] ..."""
-TILT_PATIENCE_S, PATIENT_TILT = 6.0, np.deg2rad(0.7)
-"""... or, after so long [s], this well [rad]: in flight without turning, tilt cannot be separated
-from the bias of the accelerometer."""
+TILT_PATIENCE_S, PATIENT_TILT = 6.0, 1.2
+"""... or, after so long [s], this well, as a multiple of the tilt that the accelerometer's bias
+seems to be: in flight without turning the two cannot be separated."""
 UNKNOWN_TILT = np.deg2rad(5.0)
 """Standard deviation of the vertical by one reading of the accelerometer [rad]."""
 POSE_SIGMA_PX = 0.3
@@ -60,6 +61,9 @@ class TightScale:
         # Without an IMU the scale stays unknown: the unit is the scene's median depth.
         self.known = self.settled = slam.calibration.imu is None
         self.tilt_sigma = UNKNOWN_TILT
+        imu = slam.calibration.imu
+        stated = 0.0 if imu is None else imu.accelerometer_bias_sigma
+        self._bias_sigma = max(ACCELEROMETER_BIAS_SIGMA, stated)
         self._slam = slam
         self._judged = 0
 
@@ -125,7 +129,8 @@ class TightScale:
             sigma = min(sigma, self.estimate.sigma)
         self.estimate = ScaleEstimate(sigma, sigma < OBSERVABLE_SIGMA)
         self.tilt_sigma = min(alignment.tilt_sigma, UNKNOWN_TILT)
-        tilt = PATIENT_TILT if self._seconds() > TILT_PATIENCE_S else SETTLED_TILT
+        patient = self._seconds() > TILT_PATIENCE_S
+        tilt = PATIENT_TILT * self._bias_sigma / GRAVITY if patient else SETTLED_TILT
         self.settled |= sigma < SETTLED_SIGMA and self.tilt_sigma < tilt
 
     def _seconds(self) -> float:
@@ -144,13 +149,13 @@ class TightScale:
         centres = np.array(
             [state.position + state.rotation @ slam.T_rig_camera.translation for state in states]
         )
-        noise = VisualNoise(pose_sigma(slam))
+        camera, noise = slam.T_rig_camera, VisualNoise(pose_sigma(slam))
         if slam.inertial:
-            return refine_scale(rotations, centres, slam.T_rig_camera, motions, noise)
+            return refine_scale(rotations, centres, camera, motions, noise, self._bias_sigma)
         known: list[Preintegration] = [motion for motion in motions if motion is not None]
         if len(known) < len(motions):
             return None
-        return align(rotations, centres, slam.T_rig_camera, known, noise)
+        return align(rotations, centres, camera, known, noise, self._bias_sigma)
 
 
 def pose_sigma(slam: KeyframeSlam) -> float:

@@ -47,8 +47,9 @@ def keyframes_of(
     rng: np.random.Generator,
     noisy: bool = True,
     every_s: float = 0.25,
+    bias_sigmas: tuple[float, float] = BIAS_SIGMAS,
 ) -> Keyframes:
-    sigmas = BIAS_SIGMAS if noisy else (0.0, 0.0)
+    sigmas = bias_sigmas if noisy else (0.0, 0.0)
     reading = read_imu(motion, seconds + 0.1, rng if noisy else None, bias_sigmas=sigmas)
     buffer = ImuBuffer(ADIS16448)
     buffer.add(reading.samples)

@@ -50,7 +50,7 @@ def test_normal_equations_are_those_of_the_residuals(hole):
     rng = np.random.default_rng(3)
     k = keyframes_of(lively(rng), 1.0, rng)
     motions = [None if i == hole else m for i, m in enumerate(k.motions)]
-    chain = _chain(k.rotations, k.centres, T_RIG_CAMERA, motions, VisualNoise(0.01, 0.01))
+    chain = _chain(k.rotations, k.centres, T_RIG_CAMERA, motions, VisualNoise(0.01, 0.01), 0.1)
     rotations = k.rotations @ Rotation.from_rotvec(rng.normal(0, 0.1, (COUNT, 3))).as_matrix()
     vectors = rng.normal(0, 0.1, (COUNT, 4, 3))
     vectors[:, 0] += 2.5 * k.centres

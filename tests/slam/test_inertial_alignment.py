@@ -92,6 +92,29 @@ def test_hover_and_even_motion_do_not_show_the_scale(seed, velocity, tilt_rad, s
     assert result.scale_sigma > 0.05
 
 
+def squared_tilts(bias_mps2: float, stated_mps2: float) -> float:
+    """Of 60 take-offs, normalized by the alignment's own deviation per axis and summed."""
+    total = 0.0
+    for seed in range(2000, 2060):
+        rng = np.random.default_rng(seed)
+        motion = Motion(rising, tilting(rng))
+        k = keyframes_of(motion, 4.0, rng, bias_sigmas=(5e-3, bias_mps2))
+        result = align(k.rotations, k.centres, T_RIG_CAMERA, k.motions, NOISE, stated_mps2)
+        up = result.R_map_v @ k.R_v_world[:, 2]
+        total += (up[0] ** 2 + up[1] ** 2) / result.tilt_sigma**2
+    return total
+
+
+@pytest.mark.parametrize("bias_mps2", [0.1, 0.2])
+def test_the_vertical_is_as_uncertain_as_the_bias_of_the_accelerometer(bias_mps2):
+    low, high = chi2.ppf([0.005, 0.995], 120)
+    assert low < squared_tilts(bias_mps2, bias_mps2) < high
+
+
+def test_a_bias_above_the_stated_one_shows_in_the_tilts():
+    assert squared_tilts(bias_mps2=0.2, stated_mps2=0.1) > 200
+
+
 def test_true_noise_above_the_stated_widens_the_sigma():
     rng = np.random.default_rng(2)
     k = keyframes_of(Motion(rising, tilting(rng)), 5.0, rng)

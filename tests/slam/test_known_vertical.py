@@ -15,7 +15,6 @@ from airground.slam import so3
 from airground.slam.inertial.preintegration import GRAVITY
 from airground.slam.known_vertical import (
     ASSUMED_SIGMA,
-    BIAS_OF_DENSITY,
     FIRST_READING_S,
     READING_MPS2,
     KnownVertical,
@@ -26,7 +25,7 @@ MOUNTED = so3.exp(np.array([0.4, -1.2, 0.7]))
 """Axes of an accelerometer in its robot: any."""
 DENSITY, WALK = 2e-3, 3e-3
 STEADY, WALKING = ImuNoise(2e-4, 2e-5, DENSITY, 0.0), ImuNoise(2e-4, 2e-5, DENSITY, WALK)
-BIAS_MPS2, OF_A_SECOND = BIAS_OF_DENSITY * DENSITY, READING_MPS2**2 + DENSITY**2
+BIAS_MPS2, OF_A_SECOND = STEADY.accelerometer_bias_sigma, READING_MPS2**2 + DENSITY**2
 AT_REST = float(np.sqrt(BIAS_MPS2**2 + OF_A_SECOND / FIRST_READING_S) / GRAVITY)
 
 
