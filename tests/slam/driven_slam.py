@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from airground.config import MonocularSlam
-from airground.core.messages import ImuSamples, RobotCalibration
+from airground.core.messages import ImuNoise, ImuSamples, RobotCalibration
 from airground.core.se3 import SE3
 from airground.slam.keyframe_slam import KeyframeSlam
 from airground.slam.rig_state import RigState
@@ -30,17 +30,20 @@ NOTHING = np.empty((0, 2))
 class DrivenSlam:
     """The engine after `seconds` of a motion, image by image.
 
-    The visual map has any attitude and a unit of 2.5 m; every seventh image is a keyframe.
+    The visual map has any attitude and a unit of 2.5 m; every seventh image is a keyframe. The
+    calibration states `imu`; the samples are those of an ADIS16448.
 
     Attributes:
         slam: The engine.
         R_v_world: (3, 3) attitude of the visual map.
     """
 
-    def __init__(self, motion: Motion, seconds: float, seed: int = 0) -> None:
+    def __init__(
+        self, motion: Motion, seconds: float, seed: int = 0, imu: ImuNoise = ADIS16448
+    ) -> None:
         self._rng = np.random.default_rng(seed)
         self._motion = motion
-        self.slam = KeyframeSlam(CALIBRATION, MonocularSlam(), self._rng)
+        self.slam = KeyframeSlam(replace(CALIBRATION, imu=imu), MonocularSlam(), self._rng)
         samples = read_imu(motion, seconds + 0.5, self._rng).samples
         self._samples = samples
         self.R_v_world = SE3.from_rotation_vector(self._rng.normal(0, 1.0, 3)).rotation

@@ -9,6 +9,7 @@ from scipy.stats import chi2
 from airground.core.se3 import SE3
 from airground.slam import so3
 from airground.slam.inertial.alignment import InertialAlignment, VisualNoise, align, refine_scale
+from airground.slam.inertial.preintegration import GRAVITY
 from tests.slam.inertial_keyframes import (
     NOISE,
     POSITION_SIGMA,
@@ -133,6 +134,19 @@ def test_too_few_keyframes_or_motions_are_refused():
         align(k.rotations[:3], k.centres[:3], T_RIG_CAMERA, k.motions[:2], NOISE)
     with pytest.raises(ValueError, match="go with as many centres and 4 motions"):
         align(k.rotations, k.centres, T_RIG_CAMERA, k.motions[:3], NOISE)
+
+
+def test_refinement_knows_the_vertical_as_well_as_the_stated_accelerometer_shows_it():
+    rng = np.random.default_rng(7)
+    # Without turning, the vertical cannot be told from the accelerometer's bias.
+    k = keyframes_of(Motion(rising, tilting(rng, 0.0)), 4.0, rng)
+    rotations = k.R_v_world.T @ k.rotations
+    centres = UNIT_M * k.centres @ k.R_v_world
+    noise = VisualNoise(POSITION_SIGMA, ROTATION_SIGMA)
+    for stated in (0.1, 0.2):
+        result = refine_scale(rotations, centres, T_RIG_CAMERA, k.motions, noise, stated)
+        widened = max(1.0, result.rms)
+        assert result.tilt_sigma == pytest.approx(widened * stated / GRAVITY, rel=0.03)
 
 
 @pytest.mark.parametrize("holes", [False, True])

@@ -8,13 +8,19 @@ import numpy as np
 import pytest
 
 from airground.config import Config
+from airground.slam import tight_scale
 from airground.slam.front_end import Tracking
-from airground.slam.inertial.alignment import OBSERVABLE_SIGMA
+from airground.slam.inertial.alignment import (
+    ACCELEROMETER_BIAS_SIGMA,
+    OBSERVABLE_SIGMA,
+    InertialAlignment,
+)
+from airground.slam.inertial.preintegration import GRAVITY
 from airground.slam.monocular import MonocularSlam
 from airground.slam.tight_scale import TightScale
 from tests.slam.driven_slam import DrivenSlam
-from tests.slam.inertial_keyframes import even
-from tests.slam.inertial_motion import Motion, lively
+from tests.slam.inertial_keyframes import even, rising, tilting
+from tests.slam.inertial_motion import ADIS16448, Motion, lively
 from tests.slam.synthetic_world import START_NS, Sequence, mav_sequence
 
 
@@ -60,6 +66,52 @@ def test_without_acceleration_nothing_is_claimed(name: str) -> None:
     scale, index = settle(DrivenSlam(Motion(even(velocity), even(np.zeros(3))), 8.0))
     assert index is None
     assert scale.estimate is None or not scale.estimate.observable
+
+
+def taking_off(stated_mps2: float) -> DrivenSlam:
+    """A take-off with an accelerometer whose calibration lets its bias be so large."""
+    share = stated_mps2 / ADIS16448.accelerometer_bias_sigma
+    density = share * ADIS16448.accelerometer_noise_density
+    imu = replace(ADIS16448, accelerometer_noise_density=density)
+    return DrivenSlam(Motion(rising, tilting(np.random.default_rng(0))), 8.0, imu=imu)
+
+
+@pytest.mark.parametrize("bias_mps2", [0.0, 0.05, 0.15, 0.225])
+def test_the_vertical_is_known_as_well_as_the_stated_accelerometer_shows_it(
+    bias_mps2: float,
+) -> None:
+    scale, index = settle(taking_off(bias_mps2))
+    assert index is not None
+    bias = max(bias_mps2, ACCELEROMETER_BIAS_SIGMA)
+    assert scale.tilt_sigma == pytest.approx(bias / GRAVITY, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("stated_mps2", "tilt_sigma", "settles"),
+    [(0.05, 0.012, True), (0.05, 0.014, False), (0.15, 0.014, True), (0.15, 0.020, False)],
+)
+def test_a_vertical_settles_at_last_where_it_is_known_as_well_as_the_bias_lets_it(
+    stated_mps2: float, tilt_sigma: float, settles: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    driven = taking_off(stated_mps2)
+    scale, index = settle(driven)
+    assert index is not None
+    assert not scale.settled
+    stated = []
+
+    def refined(rotations, centres, T_rig_camera, motions, noise, bias_sigma):
+        stated.append(bias_sigma)
+        unmoved = np.zeros((len(rotations), 3))
+        return InertialAlignment(
+            1.0, np.eye(3), unmoved, unmoved, unmoved, 0.01, tilt_sigma, True, 1.0
+        )
+
+    monkeypatch.setattr(tight_scale, "refine_scale", refined)
+    for later in range(index + 1, len(driven.times)):
+        driven.image(later)
+        scale.update(True)
+    assert set(stated) == {max(stated_mps2, ACCELEROMETER_BIAS_SIGMA)}
+    assert scale.settled == settles
 
 
 def test_where_samples_are_missing_it_waits() -> None:
