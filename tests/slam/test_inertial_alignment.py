@@ -138,7 +138,7 @@ def test_too_few_keyframes_or_motions_are_refused():
 
 def test_refinement_knows_the_vertical_as_well_as_the_stated_accelerometer_shows_it():
     rng = np.random.default_rng(7)
-    # Without turning, the vertical cannot be told from the accelerometer's bias.
+    # Without turning, the vertical and the accelerometer's bias cannot be separated.
     k = keyframes_of(Motion(rising, tilting(rng, 0.0)), 4.0, rng)
     rotations = k.R_v_world.T @ k.rotations
     centres = UNIT_M * k.centres @ k.R_v_world
