@@ -64,6 +64,9 @@ def _is_none(value: object) -> bool:
 
 
 TurnSigma = Annotated[float | None, Field(ge=0, le=ranges.MAX_TURN_SIGMA_RAD, exclude_if=_is_none)]
+BiasSigma = Annotated[
+    float | None, Field(ge=ranges.MIN_BIAS_MPS2, le=ranges.MAX_BIAS_MPS2, exclude_if=_is_none)
+]
 OffsetSigma = Annotated[float | None, Field(ge=0, le=ranges.MAX_OFFSET_NS, exclude_if=_is_none)]
 ScaleSigma = Annotated[float | None, Field(ge=0, le=ranges.MAX_SCALE_SIGMA, exclude_if=_is_none)]
 """Standard deviations; None where the file does not state them."""
@@ -144,9 +147,17 @@ class ImuTable(Table):
     """[m/s^2/sqrt(Hz)]"""
     accelerometer_bias_walk: Noise
     """[m/s^3/sqrt(Hz)]"""
+    accelerometer_bias_sigma: BiasSigma = None
+    """Standard deviation of the accelerometer's bias per axis at the start [m/s^2]."""
 
     def noise(self) -> ImuNoise:
-        return ImuNoise(**self.model_dump(exclude={"rate_hz"}))
+        return ImuNoise(
+            self.gyro_noise_density,
+            self.gyro_bias_walk,
+            self.accelerometer_noise_density,
+            self.accelerometer_bias_walk,
+            self.accelerometer_bias_sigma,
+        )
 
 
 class MagnetometerTable(Table):

@@ -12,6 +12,8 @@ MIN_RATE_HZ, MAX_RATE_HZ = 1e-3, 1e5
 MIN_NOISE, MAX_NOISE = 1e-15, 100.0
 """Noise of an inertial sensor: density or walk, in its own unit. The density of a gyro for
 navigation is 1e-8 [rad/s/sqrt(Hz)]."""
+MIN_BIAS_MPS2, MAX_BIAS_MPS2 = 1e-6, 100.0
+"""Standard deviation of an accelerometer's bias [m/s^2]."""
 MIN_FIELD_NOISE_T, MAX_FIELD_NOISE_T = 1e-15, 0.1
 """Noise of a magnetometer's sample [T]."""
 MIN_UNITS_PER_M, MAX_UNITS_PER_M = 1e-3, 1e6

@@ -72,8 +72,8 @@ class KeyframeSlam:
         self.tracker = FeatureTracker.guided(parameters.patch_px, calibration.imu is not None)
         self._image_turn = ImageTurn(self.camera) if calibration.imu is None else None
         self.metric = self.inertial = False
-        self._inverse_depth_sigma, self._max_depth_m = inverse_depth_sigma, max_depth_m
-        self._rng, self.path = rng, TrackedPath()
+        self._sigmas = inverse_depth_sigma, calibration.accelerometer_bias_sigma
+        self._max_depth_m, self._rng, self.path = max_depth_m, rng, TrackedPath()
         self.reset()
 
     def reset(self) -> None:
@@ -90,7 +90,7 @@ class KeyframeSlam:
         self.moved_from: SE3 | None = None
         self.path.clear()
         own = self.camera, self.T_rig_camera, self.parameters
-        self.adjuster = MapAdjuster(self.map, *own, self._inverse_depth_sigma)
+        self.adjuster = MapAdjuster(self.map, *own, *self._sigmas)
         self._mapper = LocalMapper(self.map, self.tracker, self.adjuster, *own, self._max_depth_m)
         self._recovery = Recovery(self.map, *own)
         self._loops = LoopCloser(
@@ -255,7 +255,7 @@ class KeyframeSlam:
             min_points=self.parameters.min_points,
             rng=self._rng,
             inverse_depths=frame.shutter.inverse_depths_at(frame.depth, pixels, self._max_depth_m),
-            inverse_depth_sigma=self._inverse_depth_sigma,
+            inverse_depth_sigma=self.adjuster.inverse_depth_sigma,
         )
         if fit is None or (self.metric and jumps(fit.T_map_camera, expected)):
             return None

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from airground.config import KeyframeSlam
 from airground.core.arrays import F64, I64
 from airground.core.camera import PinholeCamera
+from airground.core.messages import USUAL_BIAS_MPS2
 from airground.core.se3 import SE3
 from airground.slam.bundle_adjustment import Role, Settings, adjust
 from airground.slam.inertial.joining import join
@@ -47,6 +48,7 @@ class MapAdjuster:
 
     Attributes:
         inverse_depth_sigma: Standard deviation of measured inverse depth [1/m].
+        bias_sigma: Standard deviation of the accelerometer's bias per axis at the start [m/s^2].
         motions: Inertial motion before each keyframe, by its index, where known.
         turns: Whether gyro turns between keyframes count where inertia does not; the gyro's bias
             at the first keyframe must then be known.
@@ -59,6 +61,7 @@ class MapAdjuster:
     T_rig_camera: SE3
     parameters: KeyframeSlam
     inverse_depth_sigma: float
+    bias_sigma: float = USUAL_BIAS_MPS2
     motions: dict[int, Preintegration] = field(default_factory=dict, init=False)
     turns: bool = field(default=False, init=False)
     settled_ns: int = field(default=np.iinfo(np.int64).min, init=False)
@@ -68,7 +71,8 @@ class MapAdjuster:
         """Move the newest keyframes and their points; older ones that saw them hold still.
 
         The IMU counts if `inertial`: the map is metric and gravity-aligned. Returns the (6, 6)
-        covariance of the newest keyframe's pose, where there is one.
+        covariance of the newest keyframe's pose, with the vertical taken as exact; None where the
+        vertical is adjusted, too.
         """
         count = len(self.map.keyframes)
         first_free = max(1, count - self.parameters.window)
@@ -77,10 +81,15 @@ class MapAdjuster:
             return None
         fixed = self._holding(free)
         roles = np.array([Role.FIXED] * len(fixed) + [Role.FREE] * len(free))
-        if inertial and first_free == 1:
+        begins = inertial and first_free == 1
+        if begins:
             # Tilt and biases of the beginning become known only by moving.
             roles[0] = Role.GAUGE
-        settings = Settings(self.parameters.iterations, relative_decrease=WINDOW_DECREASE)
+        settings = Settings(
+            self.parameters.iterations,
+            relative_decrease=WINDOW_DECREASE,
+            covariance=not begins,
+        )
         return self._adjust(fixed + free, roles, inertial, settings)
 
     def adjust_all(self, inertial: bool, settings: Settings = GLOBAL) -> None:
@@ -160,6 +169,7 @@ class MapAdjuster:
     ) -> F64 | None:
         problem = self._problem(chosen, roles, inertial)
         place = self.place_that_stays(problem)
+        settings = self.with_prior(settings)
         result = adjust(*problem.parts(), self.camera, self.T_rig_camera, settings)
         states = result.states
         for n, keyframe in enumerate(problem.keyframes):
@@ -175,6 +185,10 @@ class MapAdjuster:
         self.keep_place(problem, place)
         problem.drop_misfits(self.map, result.residuals_px, self.parameters.corner_sigma_px)
         return result.covariance
+
+    def with_prior(self, settings: Settings) -> Settings:
+        """The settings with what is known of the accelerometer's bias beforehand."""
+        return replace(settings, accelerometer_bias_prior_sigma=self.bias_sigma)
 
     def place_that_stays(self, problem: MapProblem) -> F64 | None:
         """(3,) where the camera of the keyframe without a free place is now [m]; None where others

@@ -92,8 +92,9 @@ class SpreadAdjustment:
     def __init__(self, sparse_map: SparseMap, adjuster: MapAdjuster, inertial: bool) -> None:
         self._map, self._adjuster, self._inertial = sparse_map, adjuster, inertial
         self._problem = adjuster.whole_map(inertial)
+        settings = adjuster.with_prior(GLOBAL)
         self._pieces: Pieces[Adjustment] = adjusting(
-            *self._problem.parts(), adjuster.camera, adjuster.T_rig_camera, GLOBAL
+            *self._problem.parts(), adjuster.camera, adjuster.T_rig_camera, settings
         )
 
     def go_on(self) -> bool:

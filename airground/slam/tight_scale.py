@@ -6,7 +6,6 @@ import numpy as np
 
 from airground.slam.front_end import ScaleEstimate
 from airground.slam.inertial.alignment import (
-    ACCELEROMETER_BIAS_SIGMA,
     HOPELESS_SIGMA,
     OBSERVABLE_SIGMA,
     InertialAlignment,
@@ -61,9 +60,7 @@ class TightScale:
         # Without an IMU the scale stays unknown: the unit is the scene's median depth.
         self.known = self.settled = slam.calibration.imu is None
         self.tilt_sigma = UNKNOWN_TILT
-        imu = slam.calibration.imu
-        stated = 0.0 if imu is None else imu.accelerometer_bias_sigma
-        self._bias_sigma = max(ACCELEROMETER_BIAS_SIGMA, stated)
+        self._bias_sigma = slam.calibration.accelerometer_bias_sigma
         self._slam = slam
         self._judged = 0
 
@@ -130,8 +127,8 @@ class TightScale:
         self.estimate = ScaleEstimate(sigma, sigma < OBSERVABLE_SIGMA)
         self.tilt_sigma = min(alignment.tilt_sigma, UNKNOWN_TILT)
         patient = self._seconds() > TILT_PATIENCE_S
-        tilt = PATIENT_TILT * self._bias_sigma / GRAVITY if patient else SETTLED_TILT
-        self.settled |= sigma < SETTLED_SIGMA and self.tilt_sigma < tilt
+        seeming = PATIENT_TILT * self._bias_sigma / GRAVITY if patient else 0.0
+        self.settled |= sigma < SETTLED_SIGMA and self.tilt_sigma < max(SETTLED_TILT, seeming)
 
     def _seconds(self) -> float:
         """Duration of the map [s]."""

@@ -103,7 +103,7 @@ def calibrate(
     (mav_true, mav_nominal), (ground_true, ground_nominal) = tables
     if preset.calibration is not None:
         mav_nominal, ground_nominal = (
-            _stating(errors, table) for table in (mav_nominal, ground_nominal)
+            _stating(errors, preset.imu, table) for table in (mav_nominal, ground_nominal)
         )
     scale = 1 + signs[4] * errors.depth_scale
     depth_true, registered, measured = _depth_tables(preset, ground_true.camera, scale, errors, rng)
@@ -116,12 +116,16 @@ def calibrate(
     )
 
 
-def _stating(errors: CalibrationErrors, nominal: RobotTable) -> RobotTable:
+def _stating(errors: CalibrationErrors, noise: ImuNoise | None, nominal: RobotTable) -> RobotTable:
     """The nominal calibration with the standard deviations of its errors."""
+    imu = nominal.imu
+    if noise is not None:
+        imu = imu.model_copy(update={"accelerometer_bias_sigma": noise.accelerometer_bias})
     camera = nominal.camera.model_copy(update={"time_offset_sigma_ns": errors.time_offset_ns})
     # Of a turn by one angle about any axis.
     per_axis = float(errors.camera_to_imu / np.sqrt(3))
-    return nominal.model_copy(update={"mounting_sigma_rad": per_axis, "camera": camera})
+    stated = {"mounting_sigma_rad": per_axis, "camera": camera, "imu": imu}
+    return nominal.model_copy(update=stated)
 
 
 def _depth_tables(

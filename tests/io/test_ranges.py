@@ -28,6 +28,7 @@ from tests.io.test_hostile import edit, refused
         ("time_offset_ns = 0", "time_offset_sigma_ns = 1e300\ntime_offset_ns = 0", "sigma_ns"),
         ("gyro_noise_density = 0.0001", "gyro_noise_density = 1e-300", "gyro_noise_density"),
         ("gyro_bias_walk = 1e-05", "gyro_bias_walk = 1e300", "gyro_bias_walk"),
+        ("rate_hz = 200.0", "rate_hz = 200.0\naccelerometer_bias_sigma = 0.0", "imu.*bias_sigma"),
         ("noise_t = 1e-07", "noise_t = 5.0", "magnetometer.noise_t"),
         ("units_per_m = 5000.0", "units_per_m = 1e-300", "depth.units_per_m"),
         ("units_per_m = 5000.0", "units_per_m = 5000.0\nscale_sigma = 2.0", "depth.scale_sigma"),

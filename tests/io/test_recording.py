@@ -1,6 +1,7 @@
 """What was written is what is read, in order; damage is an error of one line."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -9,6 +10,7 @@ import pytest
 
 from airground.core.cloud import Source
 from airground.core.messages import (
+    USUAL_BIAS_MPS2,
     CalibrationSigmas,
     GroundImage,
     ImuSamples,
@@ -67,6 +69,30 @@ def test_a_header_need_not_state_how_well_the_calibration_is_known(path: Path) -
     header.write_text(text.replace("scale_sigma = 0.01", "scale_sigma = -0.01"))
     with pytest.raises(RecordingError, match="scale_sigma"):
         Recording.open(path)
+
+
+@pytest.mark.parametrize(
+    ("density", "stated", "known"),
+    [(1e-3, None, USUAL_BIAS_MPS2), (1e-2, None, 0.25), (1e-3, 0.03, 0.03), (1e-2, 0.03, 0.03)],
+)
+def test_the_bias_of_an_accelerometer_is_as_stated_or_as_usual(
+    path: Path, density: float, stated: float | None, known: float
+) -> None:
+    header = path / layout.HEADER
+    lines = f"accelerometer_noise_density = {density}\n"
+    if stated is not None:
+        lines += f"accelerometer_bias_sigma = {stated}\n"
+    text, count = re.subn(r"accelerometer_noise_density = .*\n", lines, header.read_text())
+    assert count == 2
+    header.write_text(text)
+    recording = Recording.open(path)
+    for robot in (recording.mav, recording.ground):
+        assert robot.calibration.accelerometer_bias_sigma == pytest.approx(known)
+
+
+def test_without_an_imu_a_bias_is_as_usual(path: Path) -> None:
+    calibration = replace(Recording.open(path).mav.calibration, imu=None)
+    assert calibration.accelerometer_bias_sigma == USUAL_BIAS_MPS2
 
 
 def test_messages_come_in_order_of_time_and_samples_before_their_image(path: Path) -> None:

@@ -49,9 +49,11 @@ def test_sizes_of_the_errors(preset: SensorPreset, robot: str) -> None:
 
 @pytest.mark.parametrize("preset", [NOMINAL, HARSH, PAPER], ids=lambda preset: preset.name)
 def test_the_nominal_calibration_states_how_large_its_errors_are(preset: SensorPreset) -> None:
-    errors, nominal = preset.calibration, drawn(preset).nominal
+    errors, noise, nominal = preset.calibration, preset.imu, drawn(preset).nominal
     assert errors is not None
+    assert noise is not None
     for robot in (nominal.mav, nominal.ground):
+        assert robot.calibration().accelerometer_bias_sigma == noise.accelerometer_bias
         sigmas = robot.calibration().sigmas
         assert sigmas.clock_s == pytest.approx(errors.time_offset_ns * 1e-9)
         # Three axes of this make a turn of the preset's size.
@@ -63,6 +65,7 @@ def test_the_true_calibration_has_no_errors_to_state() -> None:
     for robot in (drawn(HARSH).true.mav, drawn(HARSH).true.ground):
         assert robot.mounting_sigma_rad is None
         assert robot.camera.time_offset_sigma_ns is None
+        assert robot.imu.accelerometer_bias_sigma is None
     assert drawn(HARSH).true.ground.depth.scale_sigma is None
 
 

@@ -10,11 +10,7 @@ import pytest
 from airground.config import Config
 from airground.slam import tight_scale
 from airground.slam.front_end import Tracking
-from airground.slam.inertial.alignment import (
-    ACCELEROMETER_BIAS_SIGMA,
-    OBSERVABLE_SIGMA,
-    InertialAlignment,
-)
+from airground.slam.inertial.alignment import OBSERVABLE_SIGMA, InertialAlignment
 from airground.slam.inertial.preintegration import GRAVITY
 from airground.slam.monocular import MonocularSlam
 from airground.slam.tight_scale import TightScale
@@ -69,26 +65,30 @@ def test_without_acceleration_nothing_is_claimed(name: str) -> None:
 
 
 def taking_off(stated_mps2: float) -> DrivenSlam:
-    """A take-off with an accelerometer whose calibration lets its bias be so large."""
-    share = stated_mps2 / ADIS16448.accelerometer_bias_sigma
-    density = share * ADIS16448.accelerometer_noise_density
-    imu = replace(ADIS16448, accelerometer_noise_density=density)
+    """A take-off with an accelerometer whose calibration states its bias to be so large."""
+    imu = replace(ADIS16448, stated_bias_sigma=stated_mps2)
     return DrivenSlam(Motion(rising, tilting(np.random.default_rng(0))), 8.0, imu=imu)
 
 
-@pytest.mark.parametrize("bias_mps2", [0.0, 0.05, 0.15, 0.225])
+@pytest.mark.parametrize("bias_mps2", [0.05, 0.15, 0.225])
 def test_the_vertical_is_known_as_well_as_the_stated_accelerometer_shows_it(
     bias_mps2: float,
 ) -> None:
     scale, index = settle(taking_off(bias_mps2))
     assert index is not None
-    bias = max(bias_mps2, ACCELEROMETER_BIAS_SIGMA)
-    assert scale.tilt_sigma == pytest.approx(bias / GRAVITY, rel=0.15)
+    assert scale.tilt_sigma == pytest.approx(bias_mps2 / GRAVITY, rel=0.15)
 
 
 @pytest.mark.parametrize(
     ("stated_mps2", "tilt_sigma", "settles"),
-    [(0.05, 0.012, True), (0.05, 0.014, False), (0.15, 0.014, True), (0.15, 0.020, False)],
+    [
+        (0.05, 0.008, True),
+        (0.05, 0.009, False),
+        (0.1, 0.012, True),
+        (0.1, 0.014, False),
+        (0.15, 0.014, True),
+        (0.15, 0.020, False),
+    ],
 )
 def test_a_vertical_settles_at_last_where_it_is_known_as_well_as_the_bias_lets_it(
     stated_mps2: float, tilt_sigma: float, settles: bool, monkeypatch: pytest.MonkeyPatch
@@ -110,7 +110,7 @@ def test_a_vertical_settles_at_last_where_it_is_known_as_well_as_the_bias_lets_i
     for later in range(index + 1, len(driven.times)):
         driven.image(later)
         scale.update(True)
-    assert set(stated) == {max(stated_mps2, ACCELEROMETER_BIAS_SIGMA)}
+    assert set(stated) == {stated_mps2}
     assert scale.settled == settles
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
 from airground.core.arrays import F64
+from airground.core.messages import USUAL_BIAS_MPS2
 from airground.core.se3 import SE3
 from airground.slam import so3
 from airground.slam.inertial.alignment_kernel import SHARED, STATE, Chain, normal_equations
@@ -26,11 +27,8 @@ OBSERVABLE_SIGMA = 0.05
 """Scale known worse than this share counts as not observable."""
 HOPELESS_SIGMA = 0.5
 """A closed form that leaves the scale this open is no start for a search."""
-ACCELEROMETER_BIAS_SIGMA = 0.1
-"""Prior of a cheap sensor's bias, a few minutes after it was turned on [m/s^2]: that of EuRoC's
-ADIS16448 is (-0.03, 0.14, 0.08) by its ground truth."""
 GYRO_BIAS_SIGMA = 0.1
-"""Prior of its gyro's [rad/s]."""
+"""Prior of the gyro's bias [rad/s]."""
 VELOCITY_SIGMA = 100.0
 """Prior of velocity: none, but the equations stay regular where a chain has one keyframe [m/s]."""
 MIN_KEYFRAMES = 4
@@ -91,7 +89,7 @@ def align(
     T_rig_camera: SE3,
     motions: Sequence[Preintegration],
     noise: VisualNoise,
-    bias_sigma: float = ACCELEROMETER_BIAS_SIGMA,
+    bias_sigma: float = USUAL_BIAS_MPS2,
 ) -> InertialAlignment:
     """Scale and gravity of a map that began with vision alone.
 
@@ -135,7 +133,7 @@ def refine_scale(
     T_rig_camera: SE3,
     motions: Sequence[Preintegration | None],
     noise: VisualNoise,
-    bias_sigma: float = ACCELEROMETER_BIAS_SIGMA,
+    bias_sigma: float = USUAL_BIAS_MPS2,
 ) -> InertialAlignment:
     """What is left to correct in scale and tilt of a metric, upright map.
 

@@ -16,13 +16,10 @@ from __future__ import annotations
 import numpy as np
 
 from airground.core.arrays import F64
+from airground.core.messages import USUAL_BIAS_MPS2
 from airground.core.se3 import SE3
 from airground.slam import so3
-from airground.slam.inertial.alignment import (
-    ACCELEROMETER_BIAS_SIGMA,
-    OBSERVABLE_SIGMA,
-    VisualNoise,
-)
+from airground.slam.inertial.alignment import OBSERVABLE_SIGMA, VisualNoise
 from airground.slam.inertial.alignment_start import tangent_basis
 from airground.slam.inertial.preintegration import GRAVITY, Preintegration
 
@@ -61,7 +58,7 @@ class ScaleFilter:
         self._mean[UNIT] = 1.0 / guess
         sigmas = np.empty(SIZE)
         sigmas[POSITION], sigmas[VELOCITY] = SPEED_SIGMA, SPEED_SIGMA
-        sigmas[BIAS], sigmas[TILTS] = ACCELEROMETER_BIAS_SIGMA, TILT_SIGMA
+        sigmas[BIAS], sigmas[TILTS] = USUAL_BIAS_MPS2, TILT_SIGMA
         sigmas[UNIT] = UNIT_SIGMA
         self._covariance = np.diag((sigmas / guess) ** 2)
         self._gravity: F64 | None = None
@@ -194,7 +191,7 @@ class ScaleFilter:
         """Say again how large the bias may be, now that the unit it was said in is known."""
         H = np.zeros((3, SIZE))
         H[:, BIAS] = np.eye(3)
-        self._measure(H, np.zeros(3), ACCELEROMETER_BIAS_SIGMA * self._mean[UNIT])
+        self._measure(H, np.zeros(3), USUAL_BIAS_MPS2 * self._mean[UNIT])
         self._anchored = True
 
     def _measure(self, H: F64, value: F64, sigma: float) -> float:
