@@ -18,6 +18,7 @@ from airground.io.calibration import (
     RobotTable,
     pose_rows,
 )
+from airground.io.calibration_ranges import MIN_BIAS_MPS2
 from sim.robots.robot_motion import Mounting
 from sim.sensors.depth import INFRARED_FOCAL_PX
 from sim.sensors.optics import EUROC_RADTAN, KINECT_RADTAN, misjudged
@@ -120,7 +121,8 @@ def _stating(errors: CalibrationErrors, noise: ImuNoise | None, nominal: RobotTa
     """The nominal calibration with the standard deviations of its errors."""
     imu = nominal.imu
     if noise is not None:
-        imu = imu.model_copy(update={"accelerometer_bias_sigma": noise.accelerometer_bias})
+        bias = max(noise.accelerometer_bias, MIN_BIAS_MPS2)
+        imu = imu.model_copy(update={"accelerometer_bias_sigma": bias})
     camera = nominal.camera.model_copy(update={"time_offset_sigma_ns": errors.time_offset_ns})
     # Of a turn by one angle about any axis.
     per_axis = float(errors.camera_to_imu / np.sqrt(3))

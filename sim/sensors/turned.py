@@ -34,7 +34,7 @@ def with_noise(preset: SensorPreset, factor: float) -> SensorPreset:
         and replace(
             depth, axial_scale=factor * depth.axial_scale, lateral_px=factor * depth.lateral_px
         ),
-        imu=imu and imu.scaled(factor),
+        imu=imu.scaled(factor) if imu and factor > 0 else None,
     )
 
 

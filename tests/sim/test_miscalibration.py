@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
+from airground.core.messages import USUAL_BIAS_MPS2
 from airground.core.se3 import SE3
+from airground.io.calibration import ImuTable
 from sim.robots.robot_motion import Mounting
 from sim.sensors.miscalibration import Calibrations, calibrate
 from sim.sensors.presets import HARSH, NOMINAL, NONE, PAPER, SensorPreset
+from sim.sensors.turned import with_noise
 
 MAV = Mounting(
     SE3.from_heading(0.5, (0.0, 0.01, 0.02)), SE3.from_rotation_vector((3, 0.2, 0), (0.1, 0, 0))
@@ -59,6 +62,15 @@ def test_the_nominal_calibration_states_how_large_its_errors_are(preset: SensorP
         # Three axes of this make a turn of the preset's size.
         assert sigmas.mounting_rad * np.sqrt(3) == pytest.approx(errors.camera_to_imu)
     assert nominal.ground.calibration().sigmas.depth_scale == errors.depth_scale
+
+
+@pytest.mark.parametrize(
+    ("factor", "stated"), [(0.0, USUAL_BIAS_MPS2), (1e-9, 1e-6), (1.0, 0.05), (30.0, 1.5)]
+)
+def test_a_calibration_can_be_written_whatever_the_noise(factor: float, stated: float) -> None:
+    imu = drawn(with_noise(NOMINAL, factor)).nominal.mav.imu
+    assert ImuTable.model_validate(imu.model_dump()) == imu
+    assert imu.noise().accelerometer_bias_sigma == pytest.approx(stated)
 
 
 def test_the_true_calibration_has_no_errors_to_state() -> None:

@@ -122,34 +122,6 @@ def test_with_an_imu_the_beginning_may_tilt_while_the_window_reaches_it(chosen: 
     assert chosen[1][1] == [Role.GAUGE, Role.FREE, Role.FREE, Role.FREE]
 
 
-def test_a_vertical_that_is_adjusted_is_not_in_the_covariance() -> None:
-    """It is stated for the whole map; until the window has left the beginning, it moves."""
-    for count, stated in [(4, False), (6, True)]:
-        problem = bundle_problems.make(count, 200, 80)
-        covariance = adjuster_of(map_of(problem), problem).adjust_window(True)
-        assert (covariance is not None) == stated
-
-
-@pytest.mark.parametrize("whole", [False, True])
-def test_a_bias_is_as_large_as_it_is_known_to_be(whole: bool) -> None:
-    """Motions that say it is 0.2 m/s^2 bend a map that knows better less."""
-    found = []
-    for bias_sigma in (1e-3, 0.05, 10.0):
-        problem = bundle_problems.make(5, 200, 80)
-        sparse_map = map_of(problem)
-        for keyframe in sparse_map.keyframes:
-            keyframe.state = replace(keyframe.state, accelerometer_bias=np.array([0.2, 0.0, 0.0]))
-        adjuster = adjuster_of(sparse_map, problem)
-        adjuster.bias_sigma = bias_sigma
-        if whole:
-            adjuster.adjust_all(True)
-        else:
-            adjuster.adjust_window(True)
-        found.append(float(np.linalg.norm(sparse_map.keyframes[0].state.accelerometer_bias)))
-    assert found[0] < 5e-3
-    assert found[0] < found[1] < found[2]
-
-
 def turned(sparse_map: SparseMap, problem: Problem) -> float:
     """Largest error of the rotation between neighbours [rad]."""
     rotations = [keyframe.state.rotation for keyframe in sparse_map.keyframes]
