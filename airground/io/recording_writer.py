@@ -13,6 +13,7 @@ from airground.io.calibration import RobotTable
 from airground.io.digests import file_digest, folder_digest
 from airground.io.euroc import camera_yaml, sensor_yaml, write_image_list, write_imu, write_magnetic
 from airground.io.header import Header, write_toml
+from airground.io.sensor_file import BIAS
 from airground.io.tum import format_stamp, write_accelerometer, write_image_lists
 
 
@@ -82,6 +83,8 @@ def _write_samples(
         "accelerometer_noise_density": nominal.imu.accelerometer_noise_density,
         "accelerometer_random_walk": nominal.imu.accelerometer_bias_walk,
     }
+    if nominal.imu.accelerometer_bias_sigma is not None:
+        numbers[BIAS] = nominal.imu.accelerometer_bias_sigma
     yaml = sensor_yaml("imu", SE3.identity(), numbers)
     (root / imu_folder / "sensor.yaml").write_text(yaml, encoding="utf-8")
     numbers = {"rate_hz": nominal.magnetometer.rate_hz, "noise": nominal.magnetometer.noise_t}

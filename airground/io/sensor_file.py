@@ -39,10 +39,13 @@ NOISE_KEYS = tuple(
     for sensor in ("gyroscope", "accelerometer")
     for kind in ("noise_density", "random_walk")
 )
+BIAS = "accelerometer_bias_sigma"
+"""Key of an IMU for how large the accelerometer's bias may be [m/s^2]; not of EuRoC."""
 DEPTH_UNITS, RATE = "depth_units_per_m", "rate_hz"
 """Keys of a calibration for the value of one metre of depth, and for folders without stamps."""
 _RANGES = {
     **dict.fromkeys(NOISE_KEYS, (ranges.MIN_NOISE, ranges.MAX_NOISE)),
+    BIAS: (ranges.MIN_BIAS_MPS2, ranges.MAX_BIAS_MPS2),
     DEPTH_UNITS: (ranges.MIN_UNITS_PER_M, ranges.MAX_UNITS_PER_M),
     RATE: (ranges.MIN_RATE_HZ, ranges.MAX_RATE_HZ),
 }
@@ -195,9 +198,11 @@ def read_pose(path: Path) -> SE3:
 
 
 def read_imu_noise(path: Path) -> ImuNoise:
-    """Read an IMU's noise densities and random walks; raises like `read_lens`."""
+    """Read an IMU's noise densities and random walks, and how large its accelerometer's bias may
+    be, where that is stated; raises like `read_lens`."""
     values = read_mapping(path)
-    return ImuNoise(*(_in_range(_value(values, key, path), key, path) for key in NOISE_KEYS))
+    noise = (_in_range(_value(values, key, path), key, path) for key in NOISE_KEYS)
+    return replace(ImuNoise(*noise), stated_bias_sigma=read_positive(path, BIAS))
 
 
 def _positive(value: object, key: str, path: Path) -> float:

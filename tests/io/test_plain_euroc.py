@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from airground.core.cloud import Source
-from airground.core.messages import ImuSamples, MavImage
+from airground.core.messages import USUAL_BIAS_MPS2, ImuSamples, MavImage
 from airground.errors import RecordingError
 from airground.io.open_recording import open_robot
 from airground.io.robot_recording import RobotRecording
@@ -84,6 +84,10 @@ def test_calibration_follows_the_sensor_files(folder: Path) -> None:
     assert calibration.imu is not None
     assert calibration.imu.gyro_noise_density == 1.6968e-04
     assert calibration.imu.accelerometer_bias_walk == 3.0e-3
+    assert calibration.accelerometer_bias_sigma == USUAL_BIAS_MPS2
+    with (folder / "mav0/imu0/sensor.yaml").open("a") as file:
+        file.write("accelerometer_bias_sigma: 0.02\n")
+    assert mav(folder).calibration.accelerometer_bias_sigma == 0.02
     np.testing.assert_allclose(
         calibration.T_imu_camera.translation, [-0.0216401454975, -0.064676986768, 0.00981073058949]
     )

@@ -48,6 +48,10 @@ def test_a_sensor_file_out_of_range(tmp_path: Path, number: str) -> None:
     refused(
         lambda: read_imu_noise(file), "key 'gyroscope_random_walk': expected a number from 1e-15"
     )
+    file.write_text(f"{IMU_YAML}accelerometer_bias_sigma: {number}\n")
+    refused(
+        lambda: read_imu_noise(file), "key 'accelerometer_bias_sigma': expected a number from 1e-06"
+    )
     file.write_text(f"depth_units_per_m: {number}\nrate_hz: {number}\n")
     for key in ("depth_units_per_m", "rate_hz"):
         refused(

@@ -124,6 +124,10 @@ BEGIN_S: dict[Robot, float] = {"mav": 11.0, "ground": 8.0}
 TURNING_S = 15.4, 15.6, 15.8
 """Starts of 5 s in which the ground robot turns through views that are new to one that its map has
 [s]."""
+FOUND_AGAIN = 6
+"""Images within which the map is found again where images show something new. After 1 s without it
+is the first or the fifth one: of fifteen drives whose fault or prior differed slightly, the fifth
+in six."""
 OFF_M, OFF_DEG = 0.03, 1.0
 """What the error of a pose may grow by through a fault; it is 1.6 cm at most in the table of
 docs/reliability.md."""
@@ -160,7 +164,8 @@ def test_images_that_fail_have_no_wrong_pose(
 ) -> None:
     found = outcome_in(recording, [Fault(kind, robot, 1.0, BEGIN_S[robot])])
     assert_no_harm(found)
-    assert found.lost == {"frozen": 30, "repeated": 15}.get(kind, found.lost)
+    unseen_images = {"frozen": 30, "repeated": 15}.get(kind, found.lost)
+    assert unseen_images <= found.lost <= unseen_images + FOUND_AGAIN
 
 
 @pytest.mark.slow
