@@ -11,7 +11,7 @@ from airground.slam.inertial.preintegration import GRAVITY
 READING_MPS2 = 0.004
 """Standard deviation of a second's reading per axis beside its noise, as images show the motion
 that is taken off [m/s^2]. So the vertical is known as well as adjustment of the whole map states,
-within a third (two drives of `easy`, docs/diary.md)."""
+within a factor of 1.5 (two drives of `easy`, docs/diary.md)."""
 FIRST_READING_S = 0.2
 """The reading that makes a map level is the mean over so long."""
 ASSUMED_SIGMA = 0.05 / GRAVITY
