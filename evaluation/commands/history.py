@@ -9,8 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional
 
 from evaluation.commands.options import OutOption, Shown, Verb
-
-ACCEPTED = Path(__file__).parents[1] / "accepted.json"
+from evaluation.commands.results import ACCEPTED
 
 
 @dataclass(frozen=True, kw_only=True)
