@@ -249,7 +249,7 @@ class Reproduce(
             ),
             trials=self._count("trials", asked.trials, extent.trials),
             baselines=self._count("baselines", asked.baselines, extent.baselines, low=0),
-            only_images=extent.only_images,
+            only_images=extent.only_images if asked.only_images is None else asked.only_images,
         )
 
     def _count(self, word: str, asked: int | None, usual: int, low: int = 1) -> int:

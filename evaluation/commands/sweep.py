@@ -81,8 +81,9 @@ class Sweep(SensorOption, SeedOption, PipelineOptions, ResumableOutOption, Clust
         from sim.sensors.presets import sensor_preset
 
         asked = self.settings().protocol
-        if asked.baselines is not None:
-            raise InputError("protocol.baselines: a sweep tries no baselines")
+        for name in ("baselines", "only_images"):
+            if getattr(asked, name) is not None:
+                raise InputError(f"protocol.{name}: a sweep tries no baselines")
         if self.duration_s is not None:
             in_range("--duration-s", self.duration_s, low=1, high=600)
         varied = parse_vary(self.vary)

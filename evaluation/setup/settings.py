@@ -74,6 +74,8 @@ class ProtocolCounts(Section):
     """Refinements from a noisy start per flight."""
     baselines: Annotated[int | None, Field(ge=0)] = None
     """Number of these that every baseline is tried on as well; 0 for none."""
+    only_images: bool | None = None
+    """Whether only the baselines that match images are tried, as at level `paper`."""
 
 
 RerunLevel = Literal["summary", "stages", "all"]

@@ -215,6 +215,22 @@ def test_the_twin_tries_the_baselines_that_match_images() -> None:
     assert measure.baselines_asked(Protocol()) == list(BASELINES)
 
 
+@pytest.mark.parametrize(
+    ("words", "only_images"),
+    [
+        (("--level", "paper"), True),
+        (("--level", "paper", "--set", "protocol.only_images=false"), False),
+        (("--level", "hard"), False),
+        (("--level", "hard", "--set", "protocol.only_images=true"), True),
+    ],
+)
+def test_which_baselines_are_tried_at_a_level(words: tuple[str, ...], only_images: bool) -> None:
+    verb = parse("reproduce", ["--out", "x", *words])
+    assert isinstance(verb, Reproduce)
+    asked = measure.baselines_asked(verb.plan().protocol)
+    assert ("ncc" not in [baseline.name for baseline in asked]) == only_images
+
+
 def test_a_negative_number_of_trials_is_refused() -> None:
     verb = parse("reproduce", ["--out", "x", "--set", "protocol.baselines=-1"])
     assert isinstance(verb, Reproduce)

@@ -28,6 +28,10 @@ WORDS += ["--set", "protocol.sequences_per_flight=1", "--set", "protocol.trials=
         ({"vary": ("scene.texture=1",), "duration_s": 0.0}, "--duration-s 0"),
         ({"vary": ("scene.texture=1",), "overrides": ("protocol.trials=0",)}, "protocol.trials"),
         ({"vary": ("scene.texture=1",), "overrides": ("protocol.baselines=1",)}, "no baselines"),
+        (
+            {"vary": ("scene.texture=1",), "overrides": ("protocol.only_images=true",)},
+            "only_images: a sweep tries no baselines",
+        ),
         ({"vary": ("scene.heap_height=1",), "scenes": ("flat",)}, r"no \[rubble\]"),
         ({"vary": ("scene.texture=1",), "scenes": ("nowhere",)}, "unknown scene 'nowhere'"),
     ],
