@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from airground.io.recording import Recording
     from airground.io.robot_recording import Pair
     from evaluation.judge.summary import Summary
+    from evaluation.measure.baselines.claims import BaselineClaims
     from evaluation.measure.showcase import Showcase
     from evaluation.run.drops import DropList
     from evaluation.run.onlooker import Onlooker
@@ -37,6 +39,8 @@ if TYPE_CHECKING:
     from evaluation.setup.settings import RerunLevel
     from evaluation.setup.setups import Given, Setup
     from sim.recording.truth import Truth
+
+logger = logging.getLogger(__name__)
 
 DROPPED = "dropped.json"
 
@@ -123,17 +127,16 @@ class RerunOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption, OutOption, Verb):
-    """Run the pipeline over a recording and measure it against the truth.
-
-    Leaves the map, poses, claims and the report. Your own and sealed recordings need no truth.
-    """
+    """Run the pipeline over a recording and measure it against the truth."""
 
     sections: ClassVar[tuple[str, ...]] = USED["run"]
 
     recording: Annotated[Positional[Path | None], Shown("RECORDING")] = None
-    """folder that simulate has written"""
+    """folder that simulate has written, with its truth or sealed"""
     drops: Annotated[Path | None, Shown("FILE")] = None
     """leave out the images that a live run dropped (its dropped.json)"""
+    baselines: bool = False
+    """also leave claims of baselines, for submit --baselines"""
 
     def idle(self, section: str, key: str) -> str:
         if section == "rerun" and not self.draws:
@@ -190,7 +193,10 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
             with self.watching(folder, name, recording, truth, setup.config, level) as onlookers:
                 if close_up is not None:
                     onlookers.append(close_up)
+                baselines = self._baselines(setup, seed, onlookers)
                 result = run_recording(recording, truth, setup, seed, drops, onlookers, apart=True)
+            if baselines is not None:
+                baselines.write(folder, result.tracked)
             showcase = (
                 None if close_up is None else close_up.showcase(result.tracked, result.augmented)
             )
@@ -217,12 +223,29 @@ class Run(OwnRecordings, GivenResults, RerunOptions, PipelineOptions, SeedOption
             seconds = max(pair.mav.duration_s, pair.ground.duration_s)
             announce(f"runs {recorded(name, seconds)}", START_S + seconds * RUN_S_PER_S)
             with self.watching(folder, name, pair, None, setup.config, level) as onlookers:
+                baselines = self._baselines(setup, seed, onlookers)
                 result = run_pair(pair, setup, seed, onlookers)
+            if baselines is not None:
+                baselines.write(folder, result.tracked)
             summary = write_pair(folder, pair, setup, result)
             write_config(setup.config, folder / "config.toml")
             write_pair_page(folder, name, summary, result)
         print_pair(summary)
         warn_of_silence(pair.mav, pair.ground)
+
+    def _baselines(
+        self, setup: Setup, seed: int, onlookers: list[Onlooker]
+    ) -> BaselineClaims | None:
+        """The baselines, as one more onlooker where they were asked for."""
+        if not self.baselines:
+            return None
+        from evaluation.measure.baselines.claims import BaselineClaims
+
+        asked = BaselineClaims(setup.config, seed)
+        for name, reason in asked.missing.items():
+            logger.warning("baseline %s is left out: %s", name, reason)
+        onlookers.append(asked)
+        return asked
 
     def _setup_with(self, variant: str) -> Setup:
         """The setup with the given results, which its variant names."""

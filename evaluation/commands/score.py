@@ -22,32 +22,60 @@ class Submit(OutOption, Verb):
     """Collect the claims of runs as a submission to score.
 
     Every run is a folder of run, with the name of its recording. A run that claimed nothing is
-    left out, which scores the same.
+    left out, which scores the same, and so is a baseline that claimed nothing in any run.
     """
 
     runs: Annotated[Positional[tuple[Path, ...]], Shown("RUN ...")]
     """folders that run has written, each named like its recording"""
+    baselines: bool = False
+    """a submission of each baseline that run --baselines had answer, in a folder of its name"""
 
     def main(self) -> None:
-        from evaluation.run.claim_log import CLAIMS
         from evaluation.setup.output import fresh_folder
 
+        self._check_runs()
+        claimed = {run: self._files(run) for run in self.runs}
+        if not any(claimed.values()):
+            raise InputError(
+                f"{self.runs[0]}: has no {self._pattern}; nothing was claimed in any run"
+            )
+        made: Counter[Path] = Counter()
+        with fresh_folder(self.out) as folder:
+            for run, files in claimed.items():
+                for file in files:
+                    part = Path(file.stem if self.baselines else "")
+                    (folder / part).mkdir(exist_ok=True)
+                    shutil.copyfile(file, folder / part / f"{run.resolve().name}.tum")
+                    made[self.out / part] += 1
+        for submission, count in sorted(made.items()):
+            print(f"{submission}: {count} of {len(self.runs)} runs claimed something")
+
+    @property
+    def _pattern(self) -> str:
+        """What a run leaves of what is asked for."""
+        from evaluation.run.claim_log import BASELINES, CLAIMS
+
+        return f"{BASELINES}/*.tum" if self.baselines else CLAIMS
+
+    def _files(self, run: Path) -> list[Path]:
+        return sorted(file for file in run.glob(self._pattern) if file.is_file())
+
+    def _check_runs(self) -> None:
+        """Raises InputError where a folder is no run, or two have one name."""
         if not self.runs:
             raise InputError("no RUN given: name at least one folder of run")
-        names = {run: run.resolve().name for run in self.runs}
-        twice = [name for name, count in Counter(names.values()).items() if count > 1]
+        names = Counter(run.resolve().name for run in self.runs)
+        twice = [name for name, count in names.items() if count > 1]
         if twice:
             raise InputError(f"{twice[0]}: two runs of this name; a submission has one each")
         for run in self.runs:
             if not run.is_dir():
                 raise InputError(f"{run}: no such folder; expected what run wrote")
-        claimed = [run for run in self.runs if (run / CLAIMS).is_file()]
-        if not claimed:
-            raise InputError(f"{self.runs[0]}: has no {CLAIMS}; nothing was claimed in any run")
-        with fresh_folder(self.out) as folder:
-            for run in claimed:
-                shutil.copyfile(run / CLAIMS, folder / f"{names[run]}.tum")
-        print(f"{self.out}: {len(claimed)} of {len(self.runs)} runs claimed something")
+            needed = (run / self._pattern).parent
+            if not needed.is_dir():
+                raise InputError(
+                    f"{run}: has no {needed.name}; expected what run --baselines wrote"
+                )
 
 
 @dataclass(frozen=True, kw_only=True)

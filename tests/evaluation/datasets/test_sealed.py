@@ -228,7 +228,8 @@ def test_from_sealed_data_to_a_score(tmp_path: Path) -> None:
     simulate = ["simulate", str(tmp_path / "small.toml"), "--sensors", "none", "--seed", "3"]
     assert answer([*simulate, "--out", str(data), "--sealed", str(truth)]) in (None, 0)
     assert not (data / "truth").exists()
-    assert answer(["run", str(data), "--out", str(run)]) in (None, 0)
+    assert answer(["run", str(data), "--baselines", "--out", str(run)]) in (None, 0)
+    assert list((run / "baselines").iterdir()) == []
     with pytest.raises(InputError, match=r"has no claims.tum; nothing was claimed"):
         answer(["submit", str(run), "--out", str(tmp_path / "submission")])
     perfect(tmp_path / "right", data, truth / "flight")
