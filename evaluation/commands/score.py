@@ -53,9 +53,9 @@ class Submit(OutOption, Verb):
     @property
     def _pattern(self) -> str:
         """What a run leaves of what is asked for."""
-        from evaluation.run.claim_log import BASELINES, CLAIMS
+        from evaluation.run.claim_log import BASELINE_CLAIMS, CLAIMS
 
-        return f"{BASELINES}/*.tum" if self.baselines else CLAIMS
+        return f"{BASELINE_CLAIMS}/*.tum" if self.baselines else CLAIMS
 
     def _files(self, run: Path) -> list[Path]:
         return sorted(file for file in run.glob(self._pattern) if file.is_file())

@@ -14,7 +14,7 @@ from evaluation.table.tracking_log import Tracked
 
 CLAIMS = "claims.tum"
 """Its file in the folder of a run."""
-BASELINES = "baselines"
+BASELINE_CLAIMS = "baselines"
 """Folder in that folder with such a file, `NAME.tum`, of each baseline that claimed anything."""
 LONGEST_GAP_NS = 100_000_000
 """Between poses of the ground robot that are interpolated: three images at 30 Hz."""

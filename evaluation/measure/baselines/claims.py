@@ -13,8 +13,7 @@ from airground.core.se3 import SE3
 from evaluation.measure.baselines.interface import Baseline, Given
 from evaluation.measure.baselines.measure import why_not_run
 from evaluation.measure.baselines.table import BASELINES
-from evaluation.run.claim_log import BASELINES as FOLDER
-from evaluation.run.claim_log import claimed_poses, newest_image
+from evaluation.run.claim_log import BASELINE_CLAIMS, claimed_poses, newest_image
 from evaluation.run.onlooker import Seen
 from evaluation.table.answer_file import write_answers
 from evaluation.table.tracking_log import Tracked
@@ -62,8 +61,8 @@ class BaselineClaims:
 
     def write(self, folder: Path, tracked: Mapping[str, Tracked]) -> None:
         """Write the claims of each baseline into the folder of a run."""
-        (folder / FOLDER).mkdir()
+        (folder / BASELINE_CLAIMS).mkdir()
         for name, claimed in self._claimed.items():
             claims = claimed_poses(claimed, tracked)
             if claims:
-                write_answers(folder / FOLDER / f"{name}.tum", claims)
+                write_answers(folder / BASELINE_CLAIMS / f"{name}.tum", claims)
