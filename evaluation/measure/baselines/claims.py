@@ -19,9 +19,9 @@ from evaluation.table.answer_file import write_answers
 from evaluation.table.tracking_log import Tracked
 
 
-def without_truth(baselines: Sequence[Baseline] = BASELINES) -> list[Baseline]:
+def without_truth() -> list[Baseline]:
     """The baselines that can answer without truth, from which priors and nearby images are made."""
-    return [one for one in baselines if one.prior == "none" and not one.views]
+    return [one for one in BASELINES if one.prior == "none" and not one.views]
 
 
 class BaselineClaims:
@@ -31,7 +31,7 @@ class BaselineClaims:
     Args:
         config: Parameters that the baselines read.
         seed: Seed of all random numbers.
-        baselines: Those that are asked, if they are installed.
+        baselines: Those that are asked, if they are installed; all `without_truth` by default.
 
     Attributes:
         missing: Why a baseline is not asked, by its name.

@@ -11,11 +11,12 @@ from airground.config import Config
 from airground.core.events import Sighted
 from airground.core.se3 import SE3
 from airground.errors import InputError
-from evaluation.cli import answer
+from evaluation.cli import answer, parse
+from evaluation.commands.run import Run
 from evaluation.measure.baselines.claims import BaselineClaims, without_truth
 from evaluation.measure.baselines.interface import Answer, Baseline, Given
 from evaluation.measure.baselines.table import BASELINES
-from evaluation.run.onlooker import Seen
+from evaluation.run.onlooker import Onlooker, Seen
 from evaluation.table.answer_file import read_answers
 from tests.evaluation.measure.closed_worlds import (
     T_GROUND_MAV,
@@ -102,6 +103,16 @@ def test_who_needs_truth_or_a_package_is_not_asked() -> None:
     claims = BaselineClaims(Config(), 0, [absent])
     claims.see(sighted(given_of(bare_floor()), 100))
     assert list(claims.missing) == ["absent"]
+
+
+def test_run_asks_them_as_onlookers_where_they_are_wanted() -> None:
+    for words, wanted in (([], False), (["--baselines"], True)):
+        verb = parse("run", ["recording", "--out", "x", *words])
+        assert isinstance(verb, Run)
+        onlookers: list[Onlooker] = []
+        asked = verb._baselines(verb.setup(), 0, onlookers)
+        assert onlookers == ([asked] if wanted else [])
+        assert (asked is not None) == wanted
 
 
 def run_folder(folder: Path, *names: str) -> Path:
